@@ -19,6 +19,8 @@ is stable: scripts and the pages below ``docs/errors/`` rely on it. A message is
 row or joint, and what to do next.
 """
 
+from collections.abc import Generator
+from contextlib import contextmanager
 from typing import ClassVar
 
 LONGEST_MESSAGE = 2000
@@ -36,78 +38,68 @@ class TauscopeError(Exception):
 
     code: ClassVar[str] = "error"
 
+    def __init_subclass__(cls, *, code: str = "") -> None:
+        """Name the kind of failure: as the class it is made from, where no code is given."""
+        super().__init_subclass__()
+        cls.code = code or cls.code
+
     def __init__(self, message: str = "") -> None:
         """Take the message, whatever a file's content put into it, as one printable line."""
         super().__init__(one_line(message))
 
 
-class RobotFileError(TauscopeError, ValueError):
+@contextmanager
+def explain_os_errors(kind: type[TauscopeError], words: str, advice: str = "") -> Generator[None, None, None]:
+    """Raise ``WORDS (reason)ADVICE`` where the operating system refuses what is done within."""
+    try:
+        yield
+    except OSError as error:
+        raise kind(f"{words} ({error.strerror or error}){advice}") from error
+
+
+class RobotFileError(TauscopeError, ValueError, code="robot-file"):
     """The robot file, or the URDF that it names, cannot be read or is not valid."""
 
-    code = "robot-file"
 
-
-class RecordingError(TauscopeError, ValueError):
+class RecordingError(TauscopeError, ValueError, code="recording"):
     """The recording cannot be read or is not valid."""
 
-    code = "recording"
 
-
-class RecordingMismatchError(RecordingError):
+class RecordingMismatchError(RecordingError, code="recording-mismatch"):
     """The recording is sound but belongs to another robot: its number of joints differs."""
 
-    code = "recording-mismatch"
 
-
-class IdentificationError(TauscopeError, ValueError):
+class IdentificationError(TauscopeError, ValueError, code="identification"):
     """The recordings cannot answer the question: too short, too poor, or without motion."""
 
-    code = "identification"
 
-
-class ExportError(TauscopeError, ValueError):
+class ExportError(TauscopeError, ValueError, code="export"):
     """A model cannot be written in the format that was asked for."""
 
-    code = "export"
 
-
-class ExcitationError(TauscopeError, ValueError):
+class ExcitationError(TauscopeError, ValueError, code="excitation"):
     """No motion keeps the limits, or a trajectory file is not valid."""
 
-    code = "excitation"
 
-
-class ScenarioError(TauscopeError, ValueError):
+class ScenarioError(TauscopeError, ValueError, code="scenario"):
     """The scenario of the simulated arm cannot be read or is not valid."""
 
-    code = "scenario"
 
-
-class AcquisitionError(TauscopeError, RuntimeError):
+class AcquisitionError(TauscopeError, RuntimeError, code="acquisition"):
     """A run cannot start, or ended before its time."""
 
-    code = "acquisition"
 
-
-class StoreError(TauscopeError, RuntimeError):
+class StoreError(TauscopeError, RuntimeError, code="store"):
     """The database or the data folder cannot be used: unreachable, damaged, locked, or of a newer form."""
 
-    code = "store"
 
-
-class NotFoundError(TauscopeError, LookupError):
+class NotFoundError(TauscopeError, LookupError, code="not-found"):
     """Nothing of that name is kept here."""
 
-    code = "not-found"
 
-
-class LimitExceededError(TauscopeError, ValueError):
+class LimitExceededError(TauscopeError, ValueError, code="limit-exceeded"):
     """An upload or a request is larger than this service accepts."""
 
-    code = "limit-exceeded"
 
-
-class MissingExtraError(TauscopeError, ImportError):
+class MissingExtraError(TauscopeError, ImportError, code="missing-extra"):
     """An optional dependency is not installed; the message names the extra to install."""
-
-    code = "missing-extra"

@@ -89,7 +89,7 @@ def read_recording(
     reading = Reading(
         {**layout.units, **(units or {})},
         layout.rate_hz if rate_hz is None else rate_hz,
-        trust_units,
+        trust_units=trust_units,
         columns=layout.columns,
         decimal=decimal or layout.decimal,
         delimiter=delimiter or layout.delimiter,

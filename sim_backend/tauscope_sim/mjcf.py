@@ -26,7 +26,7 @@ from tauscope.robot.document import MOST_JOINTS
 from tauscope.robot.kinematics import compose, joint_displacement, rotation_of_z_to
 from tauscope.robot.messages import Finding, Severity, nearest, shown
 from tauscope.robot.robot import Array, FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
-from tauscope.robot.urdf_inertia import inertia_about_frame
+from tauscope.robot.urdf_xml import inertia_about_frame
 
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 CHOSEN_STD = 0.2  # relative standard error of an MJCF's gains: most are chosen so that the arm looks right

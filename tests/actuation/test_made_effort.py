@@ -13,7 +13,7 @@ from tauscope.actuation import make_efforts
 from tauscope.dynamics import torque_regressor
 from tauscope.errors import RecordingError, RobotFileError
 from tauscope.recording import EffortKind, Recording
-from tauscope.recording.examination import examine_recording
+from tauscope.recording.examination.examine import examine_recording
 from tauscope.robot import Actuator, LinkInertia, Model, Robot, read_robot, robot_from_dict, robot_to_dict
 
 RATE_HZ = 200.0

@@ -27,7 +27,8 @@ import numpy as np  # noqa: E402
 
 from server.http.serving import served  # noqa: E402
 from server.queue.paper_files import PAPER_ROBOT  # noqa: E402
-from tauscope.trajectory import MoveSegment, Trajectory, trajectory_json  # noqa: E402
+from tauscope.trajectory import Trajectory, trajectory_json  # noqa: E402
+from tauscope.trajectory.segments import MoveSegment  # noqa: E402
 
 RUNS = "/api/v1/runs"
 START = [0.0, 0.6, 0.6]

@@ -19,7 +19,8 @@ from tauscope.cli.run_command import explain_unfinished
 from tauscope.recording import read_recording
 from tauscope.runtime.record import RunProblem, new_record
 from tauscope.runtime.states import RunState
-from tauscope.trajectory import MoveSegment, Trajectory, write_trajectory
+from tauscope.trajectory import Trajectory, write_trajectory
+from tauscope.trajectory.segments import MoveSegment
 
 Run = Callable[..., Ended]
 

@@ -14,7 +14,7 @@ from tauscope.closed_loop.plant import STEP_S, make_plant
 from tauscope.closed_loop.refine import refine_model
 from tauscope.closed_loop.segments import Segments
 from tauscope.errors import RecordingError, RecordingMismatchError
-from tauscope.export.compensation import JointFriction
+from tauscope.export.compensation.model import JointFriction
 from tauscope.export.model import ExportModel
 from tauscope.recording import EffortKind, Recording
 from tauscope.robot import Actuator, LinkInertia, Model, Robot

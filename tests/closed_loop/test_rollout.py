@@ -16,7 +16,7 @@ from tauscope.effects.joint_spring import JointSpring
 from tauscope.effects.load_dependent_friction import LoadDependentFriction
 from tauscope.errors import RecordingMismatchError, TauscopeError
 from tauscope.export.actuators import ActuatorChoice, ActuatorKind
-from tauscope.export.compensation import JointFriction
+from tauscope.export.compensation.model import JointFriction
 from tauscope.export.mjcf import to_mjcf
 from tauscope.export.model import ExportModel, FoundEffect
 from tauscope.recording import Recording

@@ -19,7 +19,8 @@ from deploy.containers import Podman, absent, as_composed, podman
 from patience import eventually
 from server.queue.paper_files import PAPER_ROBOT, write_recording
 from shared_data import REPOSITORY
-from tauscope.trajectory import MoveSegment, Trajectory, trajectory_json
+from tauscope.trajectory import Trajectory, trajectory_json
+from tauscope.trajectory.segments import MoveSegment
 
 DEPLOY = REPOSITORY / "deploy"
 CONTAINER = DEPLOY / "container"

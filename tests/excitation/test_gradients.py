@@ -15,7 +15,8 @@ from excitation.excited_arms import (
     resting_series,
 )
 from pinocchio_arm import pinocchio_model
-from tauscope.dynamics import base_parameters, friction_columns, torque_regressor
+from tauscope.dynamics import base_parameters, torque_regressor
+from tauscope.dynamics.friction import friction_columns
 from tauscope.excitation import Box, Criterion, Workspace
 from tauscope.excitation.constraints import KinematicUsage, StateUsage, smooth_maximum
 from tauscope.excitation.information import ExcitationRegressor, MotionGradient, criterion_value

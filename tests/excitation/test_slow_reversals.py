@@ -6,7 +6,8 @@ import pytest
 from excitation.excited_arms import limited_paper_arm, resting_series
 from tauscope.excitation.constraints import StateUsage
 from tauscope.excitation.slow_reversals import SlowPart, slow_part
-from tauscope.trajectory import FourierSegment, FourierSeries, MotionSamples, MoveSegment, PathSegment, motion_limits
+from tauscope.trajectory import FourierSegment, FourierSeries, MotionSamples, motion_limits
+from tauscope.trajectory.segments import MoveSegment, PathSegment
 
 ROBOT = limited_paper_arm()
 LIMITS = motion_limits(ROBOT).scaled(0.95)

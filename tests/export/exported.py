@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from tauscope.export.actuators import ActuatorChoice
-from tauscope.export.compensation import JointFriction
+from tauscope.export.compensation.model import JointFriction
 from tauscope.export.mjcf import MjcfModel, to_mjcf
 from tauscope.export.model import ExportModel, FoundEffect, Origin
 from tauscope.recording import EffortKind

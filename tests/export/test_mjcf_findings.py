@@ -22,7 +22,7 @@ from tauscope.effects.periodic_torque import Cogging
 from tauscope.effects.presliding_hysteresis import PreslidingHysteresis
 from tauscope.errors import ExportError
 from tauscope.export.actuators import ActuatorChoice, ActuatorKind
-from tauscope.export.compensation import JointFriction
+from tauscope.export.compensation.model import JointFriction
 from tauscope.export.formats import ExportFormat, make_export
 from tauscope.export.model import FoundEffect
 from tauscope.robot import Robot

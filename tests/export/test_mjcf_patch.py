@@ -12,7 +12,7 @@ from sim_backend.test_mjcf_chain import ARM, random_states, tauscope_torque, wri
 from tauscope.effects.joint_spring import JointSpring
 from tauscope.effects.periodic_torque import Cogging
 from tauscope.errors import ExportError
-from tauscope.export.compensation import JointFriction
+from tauscope.export.compensation.model import JointFriction
 from tauscope.export.mjcf_patch import patch_mjcf
 from tauscope.export.model import ExportModel, FoundEffect
 from tauscope.robot import LinkInertia, read_robot

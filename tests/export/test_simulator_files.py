@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 
 from export.exported import friction, mjcf_of
 from tauscope.errors import ExportError
-from tauscope.export import JointModel, patch_urdf
-from tauscope.export.compensation import JointFriction
-from tauscope.robot import Joint, JointLimits, JointType, LinkInertia, Placement, Robot, Segment, read_urdf_chain
+from tauscope.export.compensation.model import JointFriction
+from tauscope.export.joint_model import JointModel
+from tauscope.export.urdf import patch_urdf
+from tauscope.robot import Joint, JointLimits, JointType, LinkInertia, Placement, Robot, Segment
+from tauscope.robot.urdf import read_urdf_chain
 
 DATA = Path(os.environ.get("TAUSCOPE_DATA", Path(__file__).resolve().parents[2] / "../shared/data"))
 

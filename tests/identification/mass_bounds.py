@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.identification.consistency import LinearInequalities
+from tauscope.identification.consistency.inequalities import LinearInequalities
 from tauscope.robot import STANDARD_PARAMETERS
 
 Array = NDArray[np.float64]

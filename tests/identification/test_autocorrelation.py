@@ -12,7 +12,7 @@ from tauscope.identification.autocorrelation import (
     Autoregression,
     LaggedProducts,
 )
-from tauscope.recording.conditioning import Decimator
+from tauscope.recording.conditioning.common_band import Decimator
 
 Array = NDArray[np.float64]
 

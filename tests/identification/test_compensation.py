@@ -14,20 +14,18 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from tauscope.errors import ExportError
-from tauscope.export.compensation import (
+from tauscope.export.compensation.model import (
     CompensationModel,
     DriveUnits,
     JointCompensation,
     JointFriction,
     RecordingSource,
     drive_units,
-    to_c_header,
     to_document,
     to_json,
-    to_python,
     to_yaml,
 )
-from tauscope.export.compensation.source_code import c_string, comment_text, identifier
+from tauscope.export.compensation.source_code import c_string, comment_text, identifier, to_c_header, to_python
 from tauscope.recording import EffortKind
 from tauscope.robot import Joint, JointType
 

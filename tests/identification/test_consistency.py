@@ -9,15 +9,8 @@ import pytest
 
 from identification.mass_bounds import centre_of_mass_inequalities, mass_inequalities, total_mass_inequalities
 from tauscope.errors import IdentificationError
-from tauscope.identification.consistency import (
-    FrictionColumns,
-    LinearInequalities,
-    Prior,
-    friction_inequalities,
-    nearest_consistent_parameters,
-    plausible_prior,
-    program,
-)
+from tauscope.identification.consistency import Prior, nearest_consistent_parameters, plausible_prior, program
+from tauscope.identification.consistency.inequalities import FrictionColumns, LinearInequalities, friction_inequalities
 from tauscope.identification.consistency.nearest import MARGIN
 from tauscope.identification.consistency.triangle import UPPER_TRIANGLE, triangle_of_parameters
 from tauscope.robot import Joint, JointType, LinkInertia, Model, Placement, Robot, Segment, pseudo_inertia

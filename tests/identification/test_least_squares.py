@@ -7,7 +7,7 @@ import pytest
 
 from identification.simulated import PAPER_NOISE, Array, SimulatedArm, paper_robot, simulate, standard_errors, z_scores
 from pinocchio_arm import pinocchio_regressor
-from tauscope.dynamics import TorqueRegressor
+from tauscope.dynamics.regressor import TorqueRegressor
 from tauscope.errors import IdentificationError, RecordingMismatchError
 from tauscope.identification import Estimator, Identification, Options, dataset, document, identify, least_squares
 from tauscope.identification.dataset import Dataset, PreparedMotion

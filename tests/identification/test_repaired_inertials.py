@@ -16,7 +16,8 @@ from tauscope.diagnosis import document as diagnosis_document
 from tauscope.excitation import design_excitation
 from tauscope.excitation.setting import ExcitationOptions
 from tauscope.identification import Identification, document, identify
-from tauscope.identification.consistency import LinearInequalities, nearest_consistent_parameters, plausible_prior
+from tauscope.identification.consistency import nearest_consistent_parameters, plausible_prior
+from tauscope.identification.consistency.inequalities import LinearInequalities
 from tauscope.recording import Recording
 from tauscope.robot import LinkInertia, Robot, find_defect, nearest_body, read_robot, robot_from_dict, robot_to_dict
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from recording.recording_files import outcome
-from tauscope.recording import csv_format
+from tauscope.recording import csv_dialect
 from tauscope.recording.csv_dialect import parse_quickly
 from tauscope.recording.csv_format import read_csv
 from tauscope.recording.intake import Choice
@@ -52,7 +52,7 @@ def test_the_quick_way_agrees_with_the_strict_way(text):
         path.write_bytes(text)
         quick = outcome(lambda: read_csv(path, Choice("file.csv")))
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(csv_format, "parse_quickly", lambda *_: None)
+            patch.setattr(csv_dialect, "parse_quickly", lambda *_: None)
             strict = outcome(lambda: read_csv(path, Choice("file.csv")))
     assert quick.message == strict.message
     assert (quick.rows is None) == (strict.rows is None)

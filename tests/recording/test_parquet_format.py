@@ -6,8 +6,8 @@ import pytest
 from recording.recording_files import arrays, message_of, rows_of, snapshot
 from tauscope.errors import MissingExtraError, RecordingMismatchError
 from tauscope.recording import read_recording
+from tauscope.recording.column_files import read_parquet
 from tauscope.recording.intake import Choice
-from tauscope.recording.parquet_format import read_parquet
 
 pyarrow = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tauscope.errors import RecordingMismatchError
-from tauscope.robot import DenavitHartenbergRow, JointType, link_placements, modified_segments, standard_segments
+from tauscope.robot import JointType
+from tauscope.robot.kinematics import DenavitHartenbergRow, link_placements, modified_segments, standard_segments
 
 ANGLE = st.floats(-np.pi, np.pi)
 LENGTH = st.floats(-2.0, 2.0)

@@ -9,7 +9,8 @@ import pytest
 
 from robot.robot_texts import ROBOT_YAML, URDF, URDF_ROBOT_YAML, write_robot
 from tauscope.errors import RobotFileError
-from tauscope.robot import Robot, link_placements, read_robot, robot_from_dict, robot_to_dict
+from tauscope.robot import Robot, read_robot, robot_from_dict, robot_to_dict
+from tauscope.robot.kinematics import link_placements
 from tauscope.robot.yaml_text import read_yaml
 
 

@@ -7,16 +7,8 @@ import pytest
 
 from robot.robot_texts import ROBOT_YAML, URDF, URDF_ROBOT_YAML, replaced, write_robot
 from shared_data import needs_shared_data
-from tauscope.robot import (
-    FrictionCoefficients,
-    FrictionShape,
-    Joint,
-    JointLimits,
-    JointType,
-    Robot,
-    link_placements,
-    read_robot,
-)
+from tauscope.robot import FrictionCoefficients, FrictionShape, Joint, JointLimits, JointType, Robot, read_robot
+from tauscope.robot.kinematics import link_placements
 
 
 def _read(folder: Path, text: str, urdf: str | None = None) -> Robot:

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from robot.robot_texts import ROBOT_YAML, URDF, URDF_ROBOT_YAML, write_robot
 from tauscope.errors import RobotFileError
-from tauscope.robot import check_robot, find_defect, link_placements, read_robot, robot_from_dict, robot_to_dict
+from tauscope.robot import check_robot, find_defect, read_robot, robot_from_dict, robot_to_dict
+from tauscope.robot.kinematics import link_placements
 
 TOKEN = re.compile(r"\s+|[-+.\w]+|[^\s\w]")
 NUMBERS = [

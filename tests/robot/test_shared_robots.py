@@ -9,7 +9,8 @@ import pytest
 import tauscope
 from diagnosis.diagnosed_arm import few_or_all, only_effects
 from shared_data import SHARED_CASES, needs_shared_cases
-from tauscope.robot import Coupling, Robot, find_defect, read_robot
+from tauscope.robot import Robot, find_defect, read_robot
+from tauscope.robot.robot import Coupling
 
 pytestmark = needs_shared_cases
 

@@ -8,8 +8,11 @@ import pytest
 
 from robot.robot_texts import URDF, replaced
 from tauscope.errors import RobotFileError
-from tauscope.robot import Chain, Coupling, JointType, Severity, link_placements, read_urdf_chain
-from tauscope.robot.kinematics import rotation_of_z_to
+from tauscope.robot import JointType, Severity
+from tauscope.robot.chain import Chain
+from tauscope.robot.kinematics import link_placements, rotation_of_z_to
+from tauscope.robot.robot import Coupling
+from tauscope.robot.urdf import read_urdf_chain
 
 
 @dataclass

@@ -13,7 +13,8 @@ import pinocchio  # pyright: ignore[reportMissingImports]
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauscope.dynamics import TorqueRegressor, inverse_dynamics, mass_matrix, torque_regressor
+from tauscope.dynamics import inverse_dynamics, mass_matrix, torque_regressor
+from tauscope.dynamics.regressor import TorqueRegressor
 from tauscope.dynamics.regressor_gradient import RegressorGradient
 from tauscope.robot import Robot, read_robot, robot_from_dict, robot_to_dict
 

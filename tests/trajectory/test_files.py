@@ -12,7 +12,6 @@ from excitation.excited_arms import limited_paper_arm, resting_series
 from tauscope.errors import ExcitationError
 from tauscope.excitation import require_within_limits
 from tauscope.trajectory import (
-    DesignRecord,
     FourierSegment,
     Trajectory,
     motion_limits,
@@ -22,6 +21,7 @@ from tauscope.trajectory import (
     write_trajectory,
 )
 from tauscope.trajectory.csv_format import parse_trajectory_csv, trajectory_csv
+from tauscope.trajectory.trajectory import DesignRecord
 from trajectory.test_trajectory import whole_trajectory
 
 ROBOT = limited_paper_arm()
@@ -31,7 +31,13 @@ NAMES = ("joint1", "joint2", "joint3")
 def described_trajectory() -> Trajectory:
     """One with all that a file may hold."""
     plain = whole_trajectory()
-    record = DesignRecord("cond-f", 12345.678901234567, 1.0 / 3.0, {"position": (0.1, None, 0.3)}, 7)
+    record = DesignRecord(
+        criterion="cond-f",
+        value=12345.678901234567,
+        condition_number=1.0 / 3.0,
+        margins={"position": [0.1, None, 0.3]},
+        seed=7,
+    )
     return Trajectory("paper", NAMES, plain.segments, motion_limits(limited_paper_arm(torque=None)), record)
 
 

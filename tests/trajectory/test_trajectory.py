@@ -9,18 +9,9 @@ from hypothesis import strategies as st
 
 from excitation.excited_arms import limited_paper_arm, resting_series
 from tauscope.errors import ExcitationError
-from tauscope.trajectory import (
-    FourierSegment,
-    MotionLimits,
-    MotionSamples,
-    MoveSegment,
-    PathSegment,
-    SampledSegment,
-    Trajectory,
-    motion_limits,
-    ramp,
-)
-from tauscope.trajectory.segments import minimum_jerk
+from tauscope.trajectory import FourierSegment, MotionLimits, MotionSamples, SampledSegment, Trajectory, motion_limits
+from tauscope.trajectory.segments import MoveSegment, PathSegment, minimum_jerk
+from tauscope.trajectory.trajectory import ramp
 
 LIMITS = motion_limits(limited_paper_arm())
 NAMES = ("joint1", "joint2", "joint3")

@@ -6,12 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from tauscope.actuation.delay import FOUND_STD_S, Delay, command_torque, estimate_delays, shift_command
-from tauscope.actuation.scale import (
-    STATED_MASS_STD,
-    estimate_torque_per_volt,
-    is_open,
-    with_torque_per_volt,
-)
+from tauscope.actuation.scale import STATED_MASS_STD, estimate_torque_per_volt, is_open, with_torque_per_volt
 from tauscope.errors import RecordingError
 from tauscope.recording.columns import table_columns
 from tauscope.recording.recording import Recording
@@ -23,25 +18,17 @@ from tauscope.robot.actuator import ASSUMED_SERVO
 
 __all__ = ["make_efforts", "require_loops", "shift_command"]
 
+# Share of rows at the duty limit from which gain and torque per volt can be told from each other.
 SATURATED_SHARE = 0.02
-"""Share of rows at the duty limit from which gain and torque per volt can be told from each other."""
-
 _KEPT = {"qd": "velocity", "qdd": "acceleration", "qref": "reference", "temp": "temperature", "qlink": "link_position"}
 
 
 def make_efforts(
     robot: Robot, recordings: Sequence[Recording], held_out: Sequence[Recording] = ()
 ) -> tuple[Robot, tuple[Recording, ...], tuple[Recording, ...]]:
-    """Make torque where recordings hold commands in its place; delays that nothing states are estimated.
+    """Torque where recordings hold commands; delays not stated are estimated. Returns the robot with them, notes.
 
     Raises RecordingError where a joint has no loop, or its loop lacks a voltage.
-
-    Returns
-    -------
-    Robot
-        with the delays, and with notes on what the torque is made of
-    tuple of Recording, tuple of Recording
-        training and held out, with torque
     """
     commands = [each for each in recordings if each.effort_kind is EffortKind.COMMAND]
     unseen = [each for each in held_out if each.effort_kind is EffortKind.COMMAND]
@@ -55,7 +42,11 @@ def make_efforts(
     delays = estimate_delays(in_volts, given)
     if open_:
         scales = estimate_torque_per_volt(in_volts, given, delays, open_)
-        _require_scales(robot, given[0], set(open_) - set(scales))
+        for place in sorted(set(open_) - set(scales)):
+            raise RecordingError(
+                f"{given[0].name}: {robot.joints[place].name}: torque cannot be made of qref{place + 1} without its"
+                f" torque per volt, and stated masses do not tell it; state joints[{place}].actuator.torque_per_volt"
+            )
         robot = with_torque_per_volt(robot, scales, STATED_MASS_STD)
     joints = tuple(
         joint if joint.actuator is None else replace(joint, actuator=replace(joint.actuator, delay=delay.value))
@@ -69,10 +60,7 @@ def make_efforts(
 
 
 def require_loops(robot: Robot, recording: Recording) -> None:
-    """Refuse a robot without loops, or without the supply of one.
-
-    Raises RecordingError naming the joint and the key.
-    """
+    """Raise RecordingError, which names joint and key, where a loop is missing, or its supply."""
     for number, joint in enumerate(robot.joints, 1):
         loop = joint.actuator
         if loop is None or not loop.has_loop:
@@ -85,15 +73,6 @@ def require_loops(robot: Robot, recording: Recording) -> None:
                 f"{recording.name}: {joint.name}: torque cannot be made of qref{number} without its supply; state"
                 f" joints[{number - 1}].actuator.supply_voltage, or record volt{number}"
             )
-
-
-def _require_scales(robot: Robot, recording: Recording, lacking: set[int]) -> None:
-    """Torque per volt is stated, or stated masses tell it."""
-    for place in sorted(lacking):
-        raise RecordingError(
-            f"{recording.name}: {robot.joints[place].name}: torque cannot be made of qref{place + 1} without its torque"
-            f" per volt, and stated masses do not tell it; state joints[{place}].actuator.torque_per_volt"
-        )
 
 
 def _make_effort(robot: Robot, recording: Recording, delays: Sequence[Delay]) -> Recording:

@@ -13,14 +13,9 @@ from tauscope.recording.recording import Recording
 from tauscope.recording.samples import Array, Samples
 from tauscope.robot import Robot
 
-STEP_S = 2e-3
-"""Step of the search [s]; a parabola refines it."""
-
-FOUND_STD_S = 0.02
-"""Standard error above which a joint takes the delay of the others [s]."""
-
-SEEN = 3.0
-"""Standard errors above which a delay is taken: a loop in step with its log has none."""
+STEP_S = 2e-3  # step of the search [s]; a parabola refines it
+FOUND_STD_S = 0.02  # standard error above which a joint takes the delay of the others [s]
+SEEN = 3.0  # standard errors above which a delay is taken: a loop in step with its log has none
 
 
 @dataclass(frozen=True)
@@ -32,15 +27,7 @@ class Delay:
 
 
 def shift_command(time: Array, command: Array, delay: float, rate_hz: float | None, at: Array) -> Array:
-    """Command in force: late by a delay, and held from one update of the loop to the next.
-
-    `time`: (N,), of the recorded commands [s].
-    `command`: (N,) [rad or m].
-    `delay`: [s].
-    `rate_hz`: updates a second; None: with every sample.
-    `at`: (M,), instants that are asked for [s].
-    Returns (M,) [rad or m].
-    """
+    """`command`, (N,), at `at`, (M,), late by a delay, held between updates at `rate_hz` or rows; `time`: (N,) [s]."""
     since = at if rate_hz is None else time[0] + np.floor((at - time[0]) * rate_hz + 1e-9) / rate_hz
     known = np.isfinite(command)
     return np.interp(since - delay, time[known], command[known])
@@ -68,10 +55,7 @@ def joint_torque(robot: Robot, samples: Samples, joint: int, delay: float) -> Ar
 
 
 def estimate_delays(robot: Robot, recordings: Sequence[Recording]) -> tuple[Delay, ...]:
-    """Delays of all joints: those stated, else those that leave the least torque unexplained.
-
-    A joint that tells nothing takes the median of the others, or zero.
-    """
+    """Delays of all joints: stated, or of least unexplained torque; one that tells nothing takes the others' median."""
     loops = [joint.actuator for joint in robot.joints]
     open_ = [joint for joint, loop in enumerate(loops) if loop is not None and loop.delay is None]
     found: dict[int, Delay] = {}

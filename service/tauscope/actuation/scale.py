@@ -16,11 +16,8 @@ from tauscope.recording.recording import Recording
 from tauscope.recording.samples import Array
 from tauscope.robot import Joint, Robot
 
-STATED_MASS_STD = 0.1
-"""Relative standard error of stated masses: a data sheet's sum, or CAD without screws and cables."""
-
-KNOWN_STD = 0.3
-"""Relative standard error above which a joint does not tell its torque per volt."""
+STATED_MASS_STD = 0.1  # relative standard error of stated masses: a data sheet's sum, or CAD without screws and cables
+KNOWN_STD = 0.3  # relative standard error above which a joint does not tell its torque per volt
 
 
 def is_open(joint: Joint) -> bool:
@@ -30,10 +27,7 @@ def is_open(joint: Joint) -> bool:
 
 
 def with_torque_per_volt(robot: Robot, values: dict[int, float], std: float | None = None) -> Robot:
-    """The robot with torque per volt of some joints, by their index [Nm/V or N/V].
-
-    `std`: relative standard error of all of them.
-    """
+    """The robot with torque per volt of some joints by index [Nm/V or N/V]; `std` is relative."""
     joints = list(robot.joints)
     for place, value in values.items():
         loop = joints[place].actuator
@@ -46,10 +40,7 @@ def with_torque_per_volt(robot: Robot, values: dict[int, float], std: float | No
 def estimate_torque_per_volt(
     robot: Robot, recordings: Sequence[Recording], delays: Sequence[Delay], joints: Sequence[int]
 ) -> dict[int, float]:
-    """Torque per volt by joint; a joint that tells nothing takes that of joints with the same servo, if any.
-
-    `robot`: with 1 Nm/V at these joints; `recordings`: with commands.
-    """
+    """Torque per volt by joint, from a robot with 1 Nm/V there; a joint that tells nothing takes its servo's."""
     links = robot.model.links
     if links is None:
         return {}

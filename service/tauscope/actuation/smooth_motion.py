@@ -10,35 +10,26 @@ from tauscope.recording.conditioning.filters import smooth
 from tauscope.recording.recording import Recording
 from tauscope.recording.samples import Array, Samples
 
+# Longest delay that is looked for [s]: buses of servos take 1 to 50 ms, a teleoperation loop up to 150 ms.
 LONGEST_S = 0.2
-"""Longest delay that is looked for [s]: buses of servos take 1 to 50 ms, a teleoperation loop up to 150 ms."""
 
+# Band of the comparison [Hz]: loops of servos pass no more, and above it steps of an encoder outweigh torque.
 BAND_HZ = 10.0
-"""Band of the comparison [Hz]: loops of servos pass no more, and above it steps of an encoder outweigh torque."""
-
-MOST_ROWS = 20_000
-"""Rows of a recording that are compared."""
-
-REST = 0.02
-"""Speed relative to the fastest below which friction has no direction."""
+MOST_ROWS = 20_000  # rows of a recording that are compared
+REST = 0.02  # speed relative to the fastest below which friction has no direction
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothMotion:
-    """Motion on a uniform grid.
-
-    `time`: (N,) [s].
-    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈.
-    `rate`, `band`: sampling rate, and band of the comparison [Hz].
-    """
+    """Motion on a uniform grid."""
 
     samples: Samples
-    time: Array
-    position: Array
+    time: Array  # (N,) [s]
+    position: Array  # (N, n), q; as are q̇, q̈
     velocity: Array
     acceleration: Array
-    rate: float
-    band: float
+    rate: float  # of sampling [Hz]
+    band: float  # of the comparison [Hz]
 
     @staticmethod
     def of(recording: Recording) -> "SmoothMotion":
@@ -47,7 +38,7 @@ class SmoothMotion:
         rate = 1.0 / float(np.median(np.diff(samples.time)))
         band = min(BAND_HZ, 0.2 * rate)
         time = np.arange(samples.time[0], samples.time[-1], 1.0 / rate)
-        raw = np.stack([_onto(samples.time, column, time) for column in samples.position.T], axis=1)
+        raw = np.stack([put_onto(samples.time, column, time) for column in samples.position.T], axis=1)
         position = smooth(raw, rate, 2.0 * band)
         velocity = np.gradient(position, 1.0 / rate, axis=0)
         acceleration = np.gradient(velocity, 1.0 / rate, axis=0)
@@ -59,17 +50,11 @@ class SmoothMotion:
         return 2.0 * self.band / self.rate
 
     def onto(self, values: Array) -> Array:
-        """Values of the recording on the grid.
-
-        `values`: (M,), one a row of the recording; NaN where it was missed. Returns (N,).
-        """
-        return _onto(self.samples.time, values, self.time)
+        """`values`, (M,), one a row of the recording, NaN where missed, on the grid, (N,)."""
+        return put_onto(self.samples.time, values, self.time)
 
     def moves(self, joint: int) -> NDArray[np.bool_]:
-        """Rows in which a joint moves, and every delay has a command, (N,).
-
-        The filter spreads friction at rest over half a period of its band: rows nearer to rest are left out.
-        """
+        """Rows in which a joint moves, and every delay has a command, (N,); not those the filter mixes with rest."""
         speed = np.abs(self.velocity[:, joint])
         reach = 2 * int(0.5 * self.rate / self.band) + 1
         moving = binary_erosion(speed > REST * speed.max(), [True] * reach, border_value=1)
@@ -77,16 +62,13 @@ class SmoothMotion:
         return moving
 
     def reduce(self, columns: Array, joint: int) -> Array:
-        """Columns with those of a joint's friction and constant beside them, in the band, where the joint moves.
-
-        `columns`: (N, k), torque by coefficient. Returns (M, k + 3).
-        """
+        """`columns`, (N, k), and a joint's friction and constant, in the band, where it moves: (M, k + 3)."""
         speed = self.velocity[:, joint]
         whole = np.column_stack([columns, speed, np.sign(speed), np.ones(len(speed))])
         return smooth(whole, self.rate, self.band)[self.moves(joint)]
 
 
-def _onto(time: Array, values: Array, at: Array) -> Array:
-    """Values at other instants; missed ones are bridged."""
+def put_onto(time: Array, values: Array, at: Array, missing: float = 0.0) -> Array:
+    """`values`, (M,) at `time`, (M,), at instants `at`, (N,); missed ones are bridged, `missing` where all are."""
     known = np.isfinite(values)
-    return np.interp(at, time[known], values[known]) if known.any() else np.zeros(len(at))
+    return np.interp(at, time[known], values[known]) if known.any() else np.full(len(at), missing)

@@ -16,16 +16,14 @@ from tauscope.server.http.settings import default_data_folder
 from tauscope.server.store.data_folder import utc_now
 
 DataFolder = Annotated[
-    Path | None,
-    Option(metavar="DIR", file_okay=False, help="Data folder of the service; the user's own by default."),
+    Path | None, Option(metavar="DIR", file_okay=False, help="Data folder of the service; the user's own by default.")
 ]
 
 
 def add_key(
     name: Annotated[str, Argument(help="Who gets the key.")],
     scope: Annotated[
-        Literal["read", "analyse", "move", "admin"],
-        Option(help="What it may do; each scope includes those before it."),
+        Literal["read", "analyse", "move", "admin"], Option(help="What it may do; each scope includes those before it.")
     ] = "read",
     days: Annotated[int, Option(min=0, max=36500, help="How long it holds; 0: for good.")] = 365,
     data: DataFolder = None,
@@ -85,5 +83,5 @@ def verify_audit(
     typer.echo(f"{found.entries} entries, none changed, moved or missing; the last one's hash is {found.head}")
 
 
-key = make_group("API keys of the service.", add=add_key, list=list_keys, revoke=revoke_key)
-audit = make_group("Who did what through the service.", verify=verify_audit)
+key = make_group(add=add_key, list=list_keys, revoke=revoke_key)
+audit = make_group(verify=verify_audit)

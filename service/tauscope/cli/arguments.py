@@ -79,14 +79,18 @@ Cutoff = Annotated[
 ]
 Json = Annotated[Path | None, name_output("Write the result as JSON; - is standard output.")]
 Report = Annotated[Path | None, name_output("Write a page to read, figures included.", "OUT.html")]
+# How recordings are read: fields of `ReadingOptions`, before `complete_reading`.
 ReadingFields = Annotated[dict[str, Any], OptionsOf(ReadingOptions)]
-"""How recordings are read: fields of `ReadingOptions`, before `complete_reading`."""
 LayoutFields = Annotated[dict[str, Any], OptionsOf(ReadingOptions, without=("trust_units",))]
 
 
 def complete_reading(values: Mapping[str, Any]) -> dict[str, Any]:
     """Options override the file of ``--columns``. Raises typer.BadParameter for an unknown unit or layout."""
-    units, columns = _parse_units(values["units"]), values["columns"]
+    text, columns = values["units"], values["columns"]
+    try:
+        units = None if text is None else parse_units(text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="'--units'") from None
     try:
         layout = RecordingLayout() if columns is None else read_layout(columns)
     except RobotFileError as error:
@@ -94,13 +98,6 @@ def complete_reading(values: Mapping[str, Any]) -> dict[str, Any]:
     stated = {name: getattr(layout, name) for name in ("rate_hz", "decimal", "delimiter", "topic")}
     given = {name: value for name, value in values.items() if value is not None}
     return {**stated, **given, "columns": layout.columns, "units": {**layout.units, **(units or {})} or units}
-
-
-def _parse_units(text: str | None) -> Mapping[str, str] | None:
-    try:
-        return None if text is None else parse_units(text)
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="'--units'") from None
 
 
 def parse_cutoff(text: str) -> float | Literal["auto"] | None:

@@ -14,7 +14,7 @@ from tauscope.cli.diagnose_command import show_diagnosis
 from tauscope.cli.identify_command import show_identification
 from tauscope.cli.task_run import write_file
 from tauscope.cli.terminal import output, say, show_progress
-from tauscope.errors import ExportError
+from tauscope.errors import ExportError, explain_os_errors
 from tauscope.runtime.drivers import DEFAULT_BACKEND, driver_names
 from tauscope.tasks import campaign as task
 from tauscope.tasks.task import Files
@@ -46,19 +46,11 @@ def campaign(
         if backend not in driver_names():
             raise typer.BadParameter(f"{backend!r} is not one of {', '.join(map(repr, driver_names()))}.")
         backend = json.dumps({"name": backend})
-    steps = {
-        "backend": backend,
-        "excitation": excitation,
-        "held_out": held_out,
-        "run": run,
-        "identification": identification,
-        "diagnosis": diagnosis,
-    }
+    steps = {"backend": backend, "excitation": excitation, "held_out": held_out, "run": run}
+    steps |= {"identification": identification, "diagnosis": diagnosis}
     request = _request(robot, steps)
-    try:
+    with explain_os_errors(ExportError, f"{out}: cannot be made", "; name a new folder"):
         out.mkdir()
-    except OSError as error:
-        raise ExportError(f"{out}: cannot be made ({error.strerror}); name a new folder") from error
     with show_progress() as progress:
         result = task.perform(request, Files({"campaign": out}), progress)
         progress("write files")

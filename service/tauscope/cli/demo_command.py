@@ -57,14 +57,14 @@ ROBOT, TRAIN, HELD_OUT = "robot.yaml", "train.csv", "held-out.csv"
 SCENARIO, TRAIN_TRAJECTORY, HELD_OUT_TRAJECTORY = "scenario.yaml", "train.json", "held-out.json"
 RESULT, REPORT = "identification.json", "report.html"
 EXPORTS = ("friction.json", "friction.yaml", "friction.h", "friction.py", "model.xml")
+# What the demo writes, and may therefore write again.
 FILES = (ROBOT, SCENARIO, TRAIN_TRAJECTORY, HELD_OUT_TRAJECTORY, TRAIN, HELD_OUT, RESULT, REPORT, *EXPORTS)
-"""What the demo writes, and may therefore write again."""
+# What the arm of that campaign conceals: a scenario, by which the diagnosis is put to the test.
 CONCEALED = {"torque_noise_std": list(NOISE_STD_NM), "seed": 1} | {
     "effects": [{"effect": "joint_spring", "joint": 1, "stiffness": 0.6}]
 }
-"""What the arm of that campaign conceals: a scenario, by which the diagnosis is put to the test."""
+# What the simulated arm conceals, but for the seed of its noise.
 SCENARIO_TEXT = f"torque_noise_std: {list(NOISE_STD_NM)}\n"
-"""What the simulated arm conceals, but for the seed of its noise."""
 _HEADING = """\
 The seed paper's arm, Table 1, as `tauscope demo` hands it to the design and to the identification: what its links weigh
 and how its joints rub is left out. Of the friction curve only the shape constants are given."""

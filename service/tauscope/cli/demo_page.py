@@ -21,7 +21,7 @@ import typer
 
 from tauscope.cli.serve_command import run_server
 from tauscope.cli.task_run import write_file
-from tauscope.errors import ExportError, StoreError, TauscopeError
+from tauscope.errors import ExportError, StoreError, TauscopeError, explain_os_errors
 from tauscope.server.http.app import serve
 from tauscope.server.http.settings import Settings
 
@@ -31,7 +31,7 @@ _FIRST_LINE = "Written by `tauscope demo`, which replaces the files named here w
 
 def prepare_folder(folder: Path, files: Sequence[str]) -> None:
     """Make and mark the folder, without an earlier demo's files. Raises ExportError where a name is taken."""
-    try:
+    with explain_os_errors(ExportError, f"{folder}: cannot be written", "; choose another --out"):
         folder.mkdir(parents=True, exist_ok=True)
         ours = _list_own(folder / MARK)
         for name in (MARK, *files):
@@ -43,8 +43,6 @@ def prepare_folder(folder: Path, files: Sequence[str]) -> None:
         for name in ours.intersection(files):
             if not (folder / name).is_dir():  # a service's data: whoever worked on it since may want it
                 (folder / name).unlink(missing_ok=True)
-    except OSError as error:
-        raise ExportError(f"{folder}: cannot be written ({error.strerror or error}); choose another --out") from error
 
 
 def _list_own(mark: Path) -> set[str]:

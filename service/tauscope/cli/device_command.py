@@ -19,19 +19,7 @@ from tauscope.extras import require_extra
 from tauscope.number_text import counted
 from tauscope.report.tables import Table
 from tauscope.robot import Robot, read_robot
-from tauscope.runtime.drivers import (
-    Finding,
-    FoundDevice,
-    FrameRequest,
-    Severity,
-    bus_drivers,
-    describe_neighbours,
-    find_bus,
-    find_driver,
-    select_bus,
-    to_drive_joints,
-    translate_driver_errors,
-)
+from tauscope.runtime import drivers
 from tauscope.runtime.guard import guard_limits
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.run import release as release_drives
@@ -40,19 +28,17 @@ from tauscope.trajectory import read_trajectory
 if TYPE_CHECKING:
     BusName = str
 else:
-    BusName = Literal[tuple(bus_drivers())]
+    BusName = Literal[tuple(drivers.bus_drivers())]
     """A name of a registered driver of a field bus: help lists the choices."""
 
 BusOption = Annotated[BusName | None, Option(help="Field bus; by default the one of the robot file's drives.")]
 DoctorRobotFile = Annotated[
     Path | None,
     name_input(
-        "Robot file (YAML) whose drives are looked at; without one, the adapters of this machine.",
-        "ROBOT",
-        Argument,
+        "Robot file (YAML) whose drives are looked at; without one, the adapters of this machine.", "ROBOT", Argument
     ),
 ]
-_MARKS = {Severity.GOOD: "ok", Severity.WARNING: "warning", Severity.FAILURE: "failure"}
+_MARKS = {drivers.Severity.GOOD: "ok", drivers.Severity.WARNING: "warning", drivers.Severity.FAILURE: "failure"}
 
 
 def doctor(robot: DoctorRobotFile = None, *, backend: BusOption = None) -> None:
@@ -80,8 +66,9 @@ def release(
     Support the arm first: joints without a brake fall. Settings that a run changed in servos' EEPROM are put back.
     """
     arm = read_robot(robot)
-    bus = select_bus(arm) if backend is None else find_bus(backend)
-    if not supported and not _ask(arm.name):
+    bus = drivers.select_bus(arm) if backend is None else drivers.find_bus(backend)
+    question = f"{arm.name} will be without torque. Is it supported?"
+    if not supported and not (sys.stdin.isatty() and typer.confirm(question)):
         raise AcquisitionError(f"{arm.name} holds on; support it, then state --supported")
     release_drives(bus.name, arm, {})
     say(f"{arm.name}: no drive is under power")
@@ -92,7 +79,8 @@ def scan(
     port: Annotated[
         str,
         Argument(
-            metavar="PORT", help=", ".join(f"{bus.port_help} ({name})" for name, bus in bus_drivers().items()) + "."
+            metavar="PORT",
+            help=", ".join(f"{bus.port_help} ({name})" for name, bus in drivers.bus_drivers().items()) + ".",
         ),
     ],
     *,
@@ -105,23 +93,23 @@ def scan(
 
     Moves nothing and writes nothing. Exit status 1 where nobody answers.
     """
-    found: list[FoundDevice] = []
-    bus = find_bus(backend)
-    with show_progress() as told, translate_driver_errors():
+    found: list[drivers.FoundDevice] = []
+    bus = drivers.find_bus(backend)
+    with show_progress() as told, drivers.translate_driver_errors():
         told(f"scan {port}")
         for device in bus.scan(port, bit_rate or None):
             found.append(device)
             told(f"scan {port}: {len(found)} found")
     if not found:
-        others = f" ({known})" if (known := describe_neighbours(bus)) else ""
+        others = f" ({known})" if (known := drivers.describe_neighbours(bus)) else ""
         raise AcquisitionError(f"{port}: nobody answers{others}; check power, cable, termination and bit rate")
     rows = [(str(one.address), one.model, one.firmware, str(one.bit_rate)) for one in found]
     output().print(table("Devices", Table(("address", "model", "firmware", "bit/s"), rows, words=2)))
 
 
-def require_sound(findings: Sequence[Finding]) -> None:
+def require_sound(findings: Sequence[drivers.Finding]) -> None:
     """Refuse to go on where a finding is a failure. Raises AcquisitionError, which names the first."""
-    failures = [finding for finding in findings if finding.severity is Severity.FAILURE]
+    failures = [finding for finding in findings if finding.severity is drivers.Severity.FAILURE]
     if failures:
         first = failures[0]
         raise AcquisitionError(
@@ -130,44 +118,41 @@ def require_sound(findings: Sequence[Finding]) -> None:
         )
 
 
-def check_drives(path: Path) -> list[Finding]:
+def check_drives(path: Path) -> list[drivers.Finding]:
     """Everything doubtful in ``drive`` blocks, without a port. Raises AcquisitionError where one has no block."""
     robot = read_robot(path)
-    meant = [bus for bus in bus_drivers().values() if any(bus.is_meant(joint.drive or {}) for joint in robot.joints)]
+    meant = [
+        bus for bus in drivers.bus_drivers().values() if any(bus.is_meant(joint.drive or {}) for joint in robot.joints)
+    ]
     if len(meant) != 1:
         return []
     (bus,) = meant
     try:
         with require_extra("checking the drives"):
-            return bus.check_blocks(to_drive_joints(bus, robot))
+            return bus.check_blocks(drivers.to_drive_joints(bus, robot))
     except MissingExtraError as error:
-        return [Finding(Severity.WARNING, bus.name, "its files were not read", str(error))]
+        return [drivers.Finding(drivers.Severity.WARNING, bus.name, "its files were not read", str(error))]
 
 
-def _adapters(backend: str | None) -> list[Finding]:
-    buses = bus_drivers().values() if backend is None else [find_bus(backend)]
-    found: list[Finding] = []
+def _adapters(backend: str | None) -> list[drivers.Finding]:
+    buses = drivers.bus_drivers().values() if backend is None else [drivers.find_bus(backend)]
+    found: list[drivers.Finding] = []
     for bus in buses:
         adapters = bus.list_adapters()
-        found += adapters or [Finding(Severity.WARNING, bus.name, "no adapter is there", "plug one in")]
+        found += adapters or [drivers.Finding(drivers.Severity.WARNING, bus.name, "no adapter is there", "plug one in")]
     return list(dict.fromkeys(found))  # several buses may hang on one kind of adapter
 
 
-def _drives(path: Path, backend: str | None) -> Sequence[Finding]:
+def _drives(path: Path, backend: str | None) -> Sequence[drivers.Finding]:
     robot = read_robot(path)
-    bus = select_bus(robot) if backend is None else find_bus(backend)
-    with translate_driver_errors():
-        return bus.examine(to_drive_joints(bus, robot))
+    bus = drivers.select_bus(robot) if backend is None else drivers.find_bus(backend)
+    with drivers.translate_driver_errors():
+        return bus.examine(drivers.to_drive_joints(bus, robot))
 
 
-def show_finding(console: Console, finding: Finding) -> None:
+def show_finding(console: Console, finding: drivers.Finding) -> None:
     remedy = f"; {finding.remedy}" if finding.remedy else ""
-    line = f"{_MARKS[finding.severity]}: {finding.subject}: {finding.detail}{remedy}"
-    say(line, console)
-
-
-def _ask(name: str) -> bool:
-    return sys.stdin.isatty() and typer.confirm(f"{name} will be without torque. Is it supported?")
+    say(f"{_MARKS[finding.severity]}: {finding.subject}: {finding.detail}{remedy}", console)
 
 
 SHOWN_CYCLES = 3  # cycles of a run whose frames are shown
@@ -181,11 +166,11 @@ def show_frames(robot_file: Path, backend: str, trajectory: Path | None, options
     rate_hz = options.rate_hz or _RATE_HZ
     speed = np.abs(np.diff(targets, axis=0)).max(axis=0) * rate_hz
     limits = guard_limits(robot, targets.min(axis=0), targets.max(axis=0), speed).drive_limits
-    request = FrameRequest(options.mode, limits, options.watchdog_s, targets[:SHOWN_CYCLES], 1.0 / rate_hz)
+    request = drivers.FrameRequest(options.mode, limits, options.watchdog_s, targets[:SHOWN_CYCLES], 1.0 / rate_hz)
     console = output()
-    bus = select_bus(robot) if find_driver(backend).is_simulated else find_bus(backend)
-    with translate_driver_errors():
-        for frame in bus.plan_frames(to_drive_joints(bus, robot), request):
+    bus = drivers.select_bus(robot) if drivers.find_driver(backend).is_simulated else drivers.find_bus(backend)
+    with drivers.translate_driver_errors():
+        for frame in bus.plan_frames(drivers.to_drive_joints(bus, robot), request):
             say(f"{frame.phase} | {frame.wire} | {frame.meaning}", console)
 
 
@@ -197,4 +182,4 @@ def _targets(robot: Robot, trajectory: Path | None, options: RunOptions) -> NDAr
     return read_trajectory(trajectory, robot).samples(options.rate_hz or _RATE_HZ).position
 
 
-bus = make_group("Look at field buses.", scan=scan)
+bus = make_group(scan=scan)

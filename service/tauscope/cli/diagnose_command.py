@@ -19,7 +19,7 @@ from tauscope.cli.arguments import (
     name_recordings,
     parse_cutoff,
 )
-from tauscope.cli.task_run import export_outputs, name_files, run_task
+from tauscope.cli.task_run import export_outputs, name_files, parse_suffix, run_task
 from tauscope.cli.terminal import output, say, table
 from tauscope.cli.verbs import OptionsOf, make_request
 from tauscope.diagnosis import DiagnosisDocument
@@ -40,8 +40,6 @@ Against = Annotated[
         " model block, a model that --model wrote, or recordings made in your own simulator.",
     ),
 ]
-
-TRAJECTORIES = (".json", ".csv")
 
 
 def diagnose(
@@ -76,7 +74,10 @@ def diagnose(
     hiding in the other parameters, and how much better recordings that were held out are then predicted.
     """
     fields = {"cutoff_hz": parse_cutoff(cutoff), **complete_reading(reading), **options}
-    motion = [] if next_trajectory is None else [(next_trajectory, f"trajectory{_trajectory_suffix(next_trajectory)}")]
+    motion: list[tuple[Path, str]] = []
+    if next_trajectory is not None:
+        suffix = parse_suffix(next_trajectory, (".json", ".csv"), "--next-trajectory")
+        motion = [(next_trajectory, f"trajectory{suffix}")]
     compared = parse_against(against)
     fields |= {"against": compared.pop("against"), "next_trajectory": bool(motion)}
     request = task.Request(
@@ -99,13 +100,6 @@ def diagnose(
     result = run_task(task, request, outputs, show)
     if result.refusal is not None:  # what was found is kept
         raise result.refusal
-
-
-def _trajectory_suffix(path: Path) -> str:
-    if path.suffix.lower() not in TRAJECTORIES:
-        text = f"{str(path)!r}: a trajectory file ends in .json or .csv"
-        raise typer.BadParameter(text, param_hint="--next-trajectory")
-    return path.suffix.lower()
 
 
 def parse_against(words: list[str]) -> dict[str, Any]:

@@ -37,8 +37,7 @@ def excite(
     json: Annotated[Path | None, name_output("Write the design as JSON, with its trajectory; - is stdout.")] = None,
     csv: Annotated[Path | None, name_output("Write the trajectory's samples as CSV for other controllers.")] = None,
     rate: Annotated[
-        float,
-        Option("--rate", "--rate-hz", metavar="HZ", min=1.0, max=10_000.0, help="Samples a second of the CSV."),
+        float, Option("--rate", "--rate-hz", metavar="HZ", min=1.0, max=10_000.0, help="Samples a second of the CSV.")
     ] = 500.0,
 ) -> None:
     """Design the motion that tells most about an arm.

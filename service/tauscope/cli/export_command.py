@@ -25,8 +25,7 @@ Output = Annotated[
     ),
 ]
 Gains = Annotated[
-    str | None,
-    Option(metavar="N,...", help="Of position and dcmotor actuators: one for all joints, or one each."),
+    str | None, Option(metavar="N,...", help="Of position and dcmotor actuators: one for all joints, or one each.")
 ]
 
 
@@ -47,7 +46,7 @@ def export(
 
     Findings of a diagnosis are included as far as the format can hold them; the file's comment lists the others.
     """
-    kind = parse_export_format(out, EXPORT_FILES, "'OUT'")
+    kind = parse_export_format(out, EXPORT_FILES, "OUT")
     if isaac_lab and kind is not ExportFormat.PYTHON:
         raise typer.BadParameter(f"{str(out)!r}: Isaac Lab reads Python (.py)", param_hint="'--isaac-lab'")
     if not isaac_lab and kind is not ExportFormat.MJCF and (actuator != "motor" or kp or kv):

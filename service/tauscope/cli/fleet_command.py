@@ -11,22 +11,14 @@ from tauscope.cli.arguments import name_input
 from tauscope.cli.task_run import require_new
 from tauscope.cli.terminal import say, show_progress
 from tauscope.cli.verbs import make_group
-from tauscope.errors import ExportError, IdentificationError
+from tauscope.errors import ExportError, IdentificationError, explain_os_errors
 from tauscope.number_text import counted
+from tauscope.server.queue import fleet as fleets
 from tauscope.server.queue.cluster_executor import ClusterExecutor, open_executor
-from tauscope.server.queue.fleet import (
-    DIAGNOSIS_COLUMNS,
-    IDENTIFICATION_COLUMNS,
-    FleetResult,
-    analyse_fleet,
-    diagnose_robot,
-    identify_robot,
-    read_manifest,
-)
 
 TABLE = "table.csv"
+# How long a robot waits for a cluster that is away, as when its scheduler is started anew [s].
 CLUSTER_PATIENCE_S = 60.0
-"""How long a robot waits for a cluster that is away, as when its scheduler is started anew [s]."""
 CORES = os.cpu_count() or 1
 
 Manifest = Annotated[
@@ -59,11 +51,9 @@ def diagnose_fleet(manifest: Manifest, out: Out, workers: Workers = CORES) -> No
 
 def run_fleet(verb: Literal["identify", "diagnose"], manifest: Path, out: Path, workers: int) -> None:
     """Raises RecordingError for a bad manifest, ExportError for results, IdentificationError if any robot failed."""
-    total = sum(1 for _ in read_manifest(manifest))
-    try:
+    total = sum(1 for _ in fleets.read_manifest(manifest))
+    with explain_os_errors(ExportError, f"{out}: cannot be made", "; choose another --out"):
         out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ExportError(f"{out}: cannot be made ({error.strerror}); choose another --out") from error
     require_new(out / TABLE)
     failed = _run(verb, manifest, out.resolve(), workers, total)
     say(f"wrote {out / TABLE}: {counted(total, 'robot')}, {failed} failed")
@@ -74,7 +64,9 @@ def run_fleet(verb: Literal["identify", "diagnose"], manifest: Path, out: Path, 
 
 def _run(verb: str, manifest: Path, out: Path, workers: int, total: int) -> int:
     columns, work = (
-        (IDENTIFICATION_COLUMNS, identify_robot) if verb == "identify" else (DIAGNOSIS_COLUMNS, diagnose_robot)
+        (fleets.IDENTIFICATION_COLUMNS, fleets.identify_robot)
+        if verb == "identify"
+        else (fleets.DIAGNOSIS_COLUMNS, fleets.diagnose_robot)
     )
     executor = open_executor(workers, CLUSTER_PATIENCE_S)
     width = executor.width if isinstance(executor, ClusterExecutor) else workers
@@ -83,7 +75,7 @@ def _run(verb: str, manifest: Path, out: Path, workers: int, total: int) -> int:
         with show_progress() as tell, (out / TABLE).open("x", newline="", encoding="utf-8") as file:
             table = csv.writer(file, lineterminator="\n")
             table.writerow(("line", "name", "state", *columns, "seconds", "error"))
-            for result in analyse_fleet(read_manifest(manifest.resolve()), work, out, executor, width):
+            for result in fleets.analyse_fleet(fleets.read_manifest(manifest.resolve()), work, out, executor, width):
                 table.writerow(_row(result, columns))
                 file.flush()
                 done, failed = done + 1, failed + (result.error is not None)
@@ -93,12 +85,10 @@ def _run(verb: str, manifest: Path, out: Path, workers: int, total: int) -> int:
     return failed
 
 
-def _row(result: FleetResult, columns: tuple[str, ...]) -> list[str]:
+def _row(result: fleets.FleetResult, columns: tuple[str, ...]) -> list[str]:
     state = "succeeded" if result.error is None else "failed"
     figures = (result.figures.get(column, "") for column in columns)
     return [str(result.entry.row), result.entry.name, state, *figures, f"{result.seconds:.2f}", result.error or ""]
 
 
-fleet = make_group(
-    "The same analysis for many robots, results in one table.", identify=identify_fleet, diagnose=diagnose_fleet
-)
+fleet = make_group(identify=identify_fleet, diagnose=diagnose_fleet)

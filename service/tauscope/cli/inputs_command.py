@@ -12,7 +12,7 @@ from typer import Argument, Option
 from tauscope import robot as robots
 from tauscope.cli.arguments import LayoutFields, ReadingFields, RecordingFile, RobotFile, complete_reading, name_input
 from tauscope.cli.device_command import check_drives, require_sound, show_finding
-from tauscope.cli.task_run import write_file
+from tauscope.cli.task_run import parse_suffix, write_file
 from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import make_group, make_request
 from tauscope.number_text import ABSENT, counted, given, significant
@@ -22,7 +22,7 @@ from tauscope.recording.convert import FORMATS
 from tauscope.recording.layout.guess import guess_parts, layout_text
 from tauscope.recording.reading import read_header
 from tauscope.report.tables import Table
-from tauscope.robot import JointSummary, RecordingLayout, RobotReport, layout_from_dict, read_robot
+from tauscope.robot import JointSummary, RecordingLayout, layout_from_dict, read_robot
 from tauscope.robot.messages import listed
 from tauscope.robot.recording_layout import Source
 from tauscope.robot.yaml_text import read_yaml
@@ -79,10 +79,7 @@ def convert_file(
 ) -> None:
     """Write a recording in another format, in SI; the source stays as it is."""
     options = make_request(ReadingOptions, **complete_reading(reading)).reading
-    if target.suffix.lower() not in FORMATS:
-        raise typer.BadParameter(
-            f"{str(target)!r}: the suffix names no format; use {', '.join(FORMATS)}", param_hint="'TARGET'"
-        )
+    parse_suffix(target, FORMATS, "TARGET")
     with show_progress() as progress:
         progress(f"convert {source}")
         arm = None if robot is None else read_robot(robot)
@@ -124,11 +121,7 @@ def _ask(layout: RecordingLayout) -> RecordingLayout:
     columns = dict(guessed)
     for group, words in QUESTIONS.items():
         default = columns.pop(group, NONE)
-        shown = (
-            default
-            if isinstance(default, str)
-            else ", ".join(map(str, default if isinstance(default, list) else [default]))
-        )
+        shown = ", ".join(map(str, default if isinstance(default, list) else [default]))
         answer = typer.prompt(f"{group}, {words}", default=shown, err=True).strip()
         if answer != NONE:
             columns[group] = answer if "," not in answer else read_yaml(f"[{answer}]", group).data
@@ -136,16 +129,15 @@ def _ask(layout: RecordingLayout) -> RecordingLayout:
 
 
 def _clock(report: RecordingReport) -> Table:
-    periods = report.periods
+    periods, marked = report.periods, ABSENT
+    if periods is not None:
+        marked = f"{periods.count} of {periods.shortest} … {periods.longest} samples"
     rows = [
         ("duration", f"{significant(report.duration_s, 6)} s"),
         ("rate", f"{significant(report.rate_hz, 5)} Hz"),
         ("steps", f"{significant(1e3 * report.steps.minimum)} … {significant(1e3 * report.steps.maximum)} ms"),
         ("gaps", str(report.gaps.count)),
-        (
-            "periods",
-            ABSENT if periods is None else f"{periods.count} of {periods.shortest} … {periods.longest} samples",
-        ),
+        ("periods", marked),
         ("missed values (NaN)", str(sum(report.missed.values()))),
         ("effort", EFFORT_WORDS[report.effort_kind]),
         ("columns", " ".join(report.columns)),
@@ -165,9 +157,8 @@ def check_robot_file(file: RobotFile) -> None:
     """Show what a robot file says, and everything doubtful in it."""
     report = robots.check_robot(file)
     console, gravity = output(), ", ".join(given(value) for value in report.gravity)
-    say(
-        f"Robot {report.name}: {counted(len(report.joints), 'joint')}, gravity [{gravity}] m/s²{_mass(report)}", console
-    )
+    mass = "" if report.total_mass is None else f", model of {given(report.total_mass)} kg"
+    say(f"Robot {report.name}: {counted(len(report.joints), 'joint')}, gravity [{gravity}] m/s²{mass}", console)
     columns = ("joint", "name", "type", "position", "velocity", "acceleration", "torque")
     columns += ("gear", "per unit", "mass [kg]")
     console.print(table("Joints", Table(columns, [_row(joint) for joint in report.joints], words=3)))
@@ -178,10 +169,6 @@ def check_robot_file(file: RobotFile) -> None:
         show_finding(console, finding)
     require_sound(findings)
     say(f"{file}: valid", console)
-
-
-def _mass(report: RobotReport) -> str:
-    return "" if report.total_mass is None else f", model of {given(report.total_mass)} kg"
 
 
 def _row(joint: JointSummary) -> list[str]:
@@ -198,7 +185,5 @@ def _row(joint: JointSummary) -> list[str]:
     ]
 
 
-robot = make_group("Look at robot files.", check=check_robot_file)
-recording = make_group(
-    "Look at recordings, and convert them.", map=map_file, check=check_recording_file, convert=convert_file
-)
+robot = make_group(check=check_robot_file)
+recording = make_group(map=map_file, check=check_recording_file, convert=convert_file)

@@ -118,4 +118,4 @@ def _outcome(firing: FiringEntry | None) -> str:
     return f"{firing.item[0]} {firing.item[1]} {firing.item_state or 'goes on'}"
 
 
-job = make_group("Do what a schedule repeats, from a timer of the system or by hand.", run=run_job, list=list_jobs)
+job = make_group(run=run_job, list=list_jobs)

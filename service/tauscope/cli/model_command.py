@@ -90,7 +90,6 @@ def _reason(entry: ModelEntry) -> str:
 
 
 model = make_group(
-    "Models of each robot over time: which one is active, and what drifts.",
     list=list_models,
     trend=show_trend,
     events=show_events,

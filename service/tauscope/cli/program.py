@@ -77,10 +77,11 @@ class Verbs(TyperGroup):
             return None
         from tauscope.cli.verbs import add_verb
 
-        found = vars(import_module(f"tauscope.cli.{VERBS[cmd_name][0]}_command"))[cmd_name]
+        module, words = VERBS[cmd_name]
+        found = vars(import_module(f"tauscope.cli.{module}_command"))[cmd_name]
         if isinstance(found, typer.Typer):
             group = get_group(found)
-            group.name = cmd_name
+            group.name, group.help = cmd_name, words
             return group
         single = typer.Typer(rich_markup_mode=None, add_completion=False)
         add_verb(single, found)
@@ -112,7 +113,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with require_extra(f"tauscope {verb}".rstrip()):
             get_command(app).main(words, prog_name="tauscope")
     except SystemExit as exit_:
-        return _status(exit_)
+        code = ExitStatus.DONE if exit_.code is None else exit_.code
+        return code if isinstance(code, int) else ExitStatus.CANNOT_ANSWER
     except KeyboardInterrupt:
         return ExitStatus.INTERRUPTED
     except TauscopeError as error:
@@ -156,9 +158,3 @@ def _fail(message: str) -> int:
 
     typer.echo(one_line(message), err=True)
     return ExitStatus.CANNOT_ANSWER
-
-
-def _status(exit_: SystemExit) -> int:
-    if exit_.code is None:
-        return ExitStatus.DONE
-    return exit_.code if isinstance(exit_.code, int) else ExitStatus.CANNOT_ANSWER

@@ -14,11 +14,12 @@ from typer import Option
 
 from tauscope.cli.arguments import RobotFile, name_input
 from tauscope.cli.device_command import show_frames
-from tauscope.cli.task_run import keep_file, require_new
+from tauscope.cli.task_run import keep_file, parse_suffix, require_new
 from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import OptionsOf, make_request, parse_numbers
-from tauscope.errors import AcquisitionError, one_line
+from tauscope.errors import AcquisitionError, explain_os_errors, one_line
 from tauscope.number_text import ABSENT, counted, significant
+from tauscope.recording.convert import FORMATS
 from tauscope.report.tables import Table
 from tauscope.robot import Robot
 from tauscope.runtime.drivers import DEFAULT_BACKEND, BackendName, driver_names, find_driver
@@ -45,7 +46,6 @@ HELD = (
     "! The arm is under power where it stopped, and its watchdog is off. Support it, then let go of it with: tauscope "
     "release."
 )
-SUFFIXES = (".csv", ".parquet", ".mcap")  # formats of a recording, by suffix
 
 
 def run(
@@ -101,7 +101,10 @@ def require_options(backend: str, options: Collection[str]) -> None:
 def _run_arm(request: task.Request, asked: Path | None) -> None:
     """Raises typer.BadParameter, or TauscopeError where the run cannot start or ended before its time."""
     out = _output(asked)
-    folder, is_settled = _folder_beside(out), False
+    with explain_os_errors(AcquisitionError, f"{out}: cannot be written there", "; choose another place"):
+        # Beside the recording, on the same disk: what is in it outlives a crash.
+        folder = Path(tempfile.mkdtemp(prefix=".tauscope-run-", dir=out.resolve().parent))
+    is_settled = False
     try:
         with show_progress() as told:
             result = task.perform(request, Files({"run": folder / "run"}), told)
@@ -155,23 +158,10 @@ def _describe_arm(record: RunRecord) -> str:
 def _output(asked: Path | None) -> Path:
     """The recording to make, refused before any work where it cannot be made."""
     out = asked or Path(f"run-{datetime.now(UTC):%Y%m%dT%H%M%SZ}.csv")
-    if out.suffix.lower() not in SUFFIXES:
-        known = ", ".join(SUFFIXES)
-        raise typer.BadParameter(f"{str(out)!r}: the suffix names no format; use {known}", param_hint="'--out'")
-    if out.suffix.lower() == ".parquet" and find_spec("pyarrow") is None:
+    if parse_suffix(out, FORMATS, "--out") == ".parquet" and find_spec("pyarrow") is None:
         raise AcquisitionError(f"{out}: Parquet needs pyarrow, which is not installed; name a .csv file")
     require_new(out)
     return out
-
-
-def _folder_beside(out: Path) -> Path:
-    """A hidden folder beside the recording, on the same disk; what is in it outlives a crash."""
-    try:
-        return Path(tempfile.mkdtemp(prefix=".tauscope-run-", dir=out.resolve().parent))
-    except OSError as error:
-        raise AcquisitionError(
-            f"{out}: cannot be written there ({error.strerror or error}); choose another place"
-        ) from error
 
 
 def show_run(console: Console, record: RunRecord, robot: Robot) -> None:

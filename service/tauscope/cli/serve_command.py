@@ -14,11 +14,11 @@ from tauscope.cli.verbs import OptionsOf
 from tauscope.server.http import app
 from tauscope.server.http.settings import Settings, default_data_folder
 
+# Settings whose options have the same name.
 _DIRECT = (
     *("host", "port", "backend", "sim_time", "sim_socket", "tls_certificate", "tls_key"),
     *("log_format", "require_lease", "prune_recordings"),
 )
-"""Settings whose options have the same name."""
 
 
 def serve(

@@ -1,7 +1,7 @@
 """``tauscope store``, ``tauscope backup`` and ``tauscope restore``: a data folder that no service works with."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
 from enum import StrEnum
@@ -14,7 +14,7 @@ from tauscope.cli.arguments import name_input
 from tauscope.cli.task_run import require_new
 from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import make_group
-from tauscope.errors import StoreError
+from tauscope.errors import StoreError, explain_os_errors
 from tauscope.number_text import ABSENT, counted
 from tauscope.report.tables import Table
 from tauscope.server.history.indexer import Indexer, open_index
@@ -66,18 +66,13 @@ def open_store(data: Path | None, database: str | None) -> Iterator[OpenStore]:
     folder = data or default_data_folder()
     if not folder.is_dir():
         raise StoreError(f"{folder}: there is no such data folder; name it with --data")
-    lock = FolderLock(folder)
-    try:
-        opened = Database(database or folder / FILE_NAME)
-        try:
-            index = Index(opened, site_identifier(folder))
-            keeper = open_index(index, item_stores(folder), RecordingStore(folder / RECORDINGS), folder.name)
-            keeper.sync(thorough=True)
-            yield OpenStore(folder, opened, keeper)
-        finally:
-            opened.close()
-    finally:
-        lock.release()
+    with ExitStack() as stack:
+        stack.callback(FolderLock(folder).release)
+        opened = stack.enter_context(closing(Database(database or folder / FILE_NAME)))
+        index = Index(opened, site_identifier(folder))
+        keeper = open_index(index, item_stores(folder), RecordingStore(folder / RECORDINGS), folder.name)
+        keeper.sync(thorough=True)
+        yield OpenStore(folder, opened, keeper)
 
 
 @contextmanager
@@ -86,11 +81,8 @@ def open_database(data: Path | None, database: str | None) -> Iterator[Database]
     path = (data or default_data_folder()) / FILE_NAME
     if database is None and not path.is_file():
         raise StoreError(f"{path}: there is no such database; name the data folder with --data, or serve it once")
-    opened = Database(database or path)
-    try:
+    with closing(Database(database or path)) as opened:
         yield opened
-    finally:
-        opened.close()
 
 
 def check_store(
@@ -135,11 +127,9 @@ def prune_store(
         kept = RecordingStore(store.folder / RECORDINGS)
         removal = plan_removal(store.keeper, ModelHistory(store.database), kept, rule, utc_now())
         if not dry_run:
-            try:
-                removers = {kind: items.remove for kind, items in item_stores(store.folder).items()}
+            removers = {kind: items.remove for kind, items in item_stores(store.folder).items()}
+            with explain_os_errors(StoreError, f"{store.folder}: cannot be removed from"):
                 removal = remove(removal, removers, kept, store.keeper)
-            except OSError as error:
-                raise StoreError(f"{store.folder}: cannot be removed from ({error.strerror or error})") from error
     rows = [(entry.kind, entry.identifier, entry.robot or ABSENT) for entry in removal.items]
     rows += [("recording", name, ABSENT) for name in removal.recordings]
     done = "would go" if dry_run else "removed"
@@ -158,10 +148,8 @@ def backup(
     folder = data or default_data_folder()
     with show_progress() as progress, open_database(folder, database) as opened:
         progress(f"copy {folder}")
-        try:
+        with explain_os_errors(StoreError, f"{file}: cannot be written", "; choose another place"):
             count = write_backup(folder, opened, file, tauscope_version())
-        except OSError as error:
-            raise StoreError(f"{file}: cannot be written ({error.strerror or error}); choose another place") from error
     say(f"wrote {file}: {counted(count, 'file')} and the database")
 
 
@@ -173,11 +161,9 @@ def restore(
     """Make a data folder from a backup; also where the database was one of the other kind."""
     with show_progress() as progress:
         progress(f"unpack {file}")
-        try:
+        with explain_os_errors(StoreError, f"{data}: cannot be written", "; choose another place"):
             count = restore_backup(file, data, database)
-        except OSError as error:
-            raise StoreError(f"{data}: cannot be written ({error.strerror or error}); choose another place") from error
     say(f"restored {data}: {counted(count, 'file')} and the database")
 
 
-store = make_group("Look after what is kept.", check=check_store, prune=prune_store)
+store = make_group(check=check_store, prune=prune_store)

@@ -1,7 +1,7 @@
 """What every verb does around its task: check the files, perform, write outputs whole or not at all, show."""
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -9,7 +9,7 @@ from typing import Any
 import typer
 
 from tauscope.cli.terminal import Told, say, show_progress
-from tauscope.errors import ExportError, one_line
+from tauscope.errors import ExportError, explain_os_errors, one_line
 from tauscope.export.formats import SUFFIXES, ExportFile, ExportFormat
 from tauscope.files import open_atomically
 from tauscope.robot import Robot, Severity, read_robot
@@ -75,14 +75,12 @@ def write_file(path: Path, content: bytes) -> None:
         typer.echo(content, nl=False)
         return
     real = path.resolve()
-    try:
+    with explain_os_errors(ExportError, f"{path}: cannot be written", "; choose another place"):
         if real.exists() and not real.is_file():  # a device or a pipe: there is nothing to replace
             real.write_bytes(content)
         else:
             with open_atomically(real) as file:
                 file.write(content)
-    except OSError as error:
-        raise ExportError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
 
 
 def run_task(
@@ -127,16 +125,21 @@ def write_outputs(
 
 def export_outputs(paths: Sequence[Path], files: Mapping[ExportFormat, ExportFile]) -> list[tuple[Path, str]]:
     """Outputs of ``--export`` by their suffixes. Raises typer.BadParameter where one names no format."""
-    return [(path, files[parse_export_format(path, files, "'--export'")].output) for path in paths]
+    return [(path, files[parse_export_format(path, files, "--export")].output) for path in paths]
 
 
 def parse_export_format(path: Path, files: Mapping[ExportFormat, ExportFile], option: str) -> ExportFormat:
     """The format that the suffix of a file names. Raises typer.BadParameter where it names none."""
-    kind = SUFFIXES.get(path.suffix.lower())
-    if kind is None or kind not in files:
-        known = ", ".join(suffix for suffix, kind in SUFFIXES.items() if kind in files)
-        raise typer.BadParameter(f"{str(path)!r}: the suffix names no format; use {known}", param_hint=option)
-    return kind
+    return SUFFIXES[parse_suffix(path, [suffix for suffix, kind in SUFFIXES.items() if kind in files], option)]
+
+
+def parse_suffix(path: Path, known: Collection[str], option: str) -> str:
+    """The suffix of a file in lower case. Raises typer.BadParameter where it is none of those known."""
+    suffix = path.suffix.lower()
+    if suffix not in known:
+        text = f"{str(path)!r}: the suffix names no format; use {', '.join(known)}"
+        raise typer.BadParameter(text, param_hint=f"'{option}'")
+    return suffix
 
 
 def _show_warnings(robot: Robot, result: Any, *, summarised: bool) -> None:

@@ -43,8 +43,8 @@ def table(title: str, view: Table) -> RichTable:
     return made
 
 
+# Told the step that goes on, and how much of it is done in percent, or None where that is not known.
 Told = Callable[..., None]
-"""Told the step that goes on, and how much of it is done in percent, or None where that is not known."""
 
 
 @contextmanager

@@ -55,9 +55,9 @@ def add_verb(
     app.command(name, cls=cls, help=inspect.getdoc(function))(expand_groups(function))
 
 
-def make_group(words: str, **verbs: Callable[..., None]) -> typer.Typer:
-    """A group of commands; `words` is its help."""
-    group = typer.Typer(help=words, no_args_is_help=True, rich_markup_mode=None)
+def make_group(**verbs: Callable[..., None]) -> typer.Typer:
+    """A group of commands; its help is its line in `VERBS`."""
+    group = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
     for name, function in verbs.items():
         add_verb(group, function, name=name)
     return group

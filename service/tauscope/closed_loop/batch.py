@@ -17,23 +17,17 @@ SWEEPS = 4  # Gauss-Seidel sweeps over the dry friction of coupled joints
 
 @dataclass(frozen=True, eq=False)
 class Variants:
-    """Parameters of V models of one arm.
+    """Parameters of V models of one arm."""
 
-    `links`: (V, 10 m), standard parameters.
-    `rotor`, `stiction`, `viscous`, `offset`: (V, n) [kg m² or kg, Nm or N, Nm s/rad or N s/m, Nm or N].
-    `stribeck`, `delta`: (n,), the same in all models.
-    `driving`, `braking`: (V, n), as `LoadFriction`.
-    """
-
-    links: Array
-    rotor: Array
-    stiction: Array
-    viscous: Array
-    offset: Array
-    stribeck: Array
-    delta: Array
-    driving: Array
-    braking: Array
+    links: Array  # (V, 10 m), standard parameters
+    rotor: Array  # (V, n) [kg m² or kg]
+    stiction: Array  # (V, n) [Nm or N]
+    viscous: Array  # (V, n) [Nm s/rad or N s/m]
+    offset: Array  # (V, n) [Nm or N]
+    stribeck: Array  # (n,), the same in all models
+    delta: Array  # (n,), the same in all models
+    driving: Array  # (V, n), as `LoadFriction`
+    braking: Array  # (V, n), as `LoadFriction`
     slope: Array  # (V,), loss of torque per volt with temperature [1/K]
 
 
@@ -108,10 +102,7 @@ def _invert(mass: Array) -> Array:
 
 
 def _brake(inverse: Array, velocity: Array, most: Array) -> Array:
-    """Velocity after dry friction, which stops a joint and never turns it round, (n, S, V).
-
-    `most`: (n, S, V), largest impulse of friction [Nm s or N s].
-    """
+    """Velocity after an impulse of dry friction of at `most`, (n, S, V), which never turns a joint round."""
     impulse, out = np.zeros_like(velocity), velocity.copy()
     for _ in range(SWEEPS if len(velocity) > 1 else 1):
         for joint in range(len(velocity)):

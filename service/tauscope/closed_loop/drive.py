@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from tauscope.actuation import shift_command
+from tauscope.actuation.smooth_motion import put_onto
 from tauscope.closed_loop.laws import RELAXED
 from tauscope.closed_loop.model import RolloutModel
 from tauscope.closed_loop.plant import STEP_S, Plant
@@ -24,11 +25,7 @@ STATE_BAND_HZ = 15.0
 
 @dataclass(frozen=True, eq=False)
 class RecordedMotion:
-    """A recording on the steps of a rollout.
-
-    `time`: (K,), of the steps [s].
-    `position`, `velocity`: (K, n), of the real arm [rad or m, rad/s or m/s].
-    """
+    """A recording on the steps of a rollout, `time` (K,) [s]; `position`, `velocity`: (K, n) of the real arm."""
 
     name: str
     time: Array
@@ -41,8 +38,6 @@ class RecordedMotion:
 class Drive(Protocol):
     """Torque of all joints."""
 
-    is_closed: bool
-
     def torque(self, step: int, position: Array, velocity: Array) -> Array:
         """Torque at a step, (n,) [Nm or N]. `position`, `velocity`: (n,), q, q̇ of the simulated arm."""
         ...
@@ -52,10 +47,10 @@ def record_motion(recording: Recording) -> RecordedMotion:
     """A recording on the steps of a rollout."""
     samples = recording.samples()
     time = np.arange(samples.time[0], samples.time[-1] + 0.5 * STEP_S, STEP_S)
-    position = np.stack([_onto(samples.time, column, time) for column in samples.position.T], axis=1)
+    position = _onto(samples.time, samples.position, time)
     velocity = np.gradient(smooth(position, 1.0 / STEP_S, STATE_BAND_HZ), STEP_S, axis=0)
     if samples.velocity is not None and np.isfinite(samples.velocity).any(axis=0).all():
-        velocity = np.stack([_onto(samples.time, column, time) for column in samples.velocity.T], axis=1)
+        velocity = _onto(samples.time, samples.velocity, time)
     return RecordedMotion(recording.name, time, position, velocity, samples.time, samples.position)
 
 
@@ -67,13 +62,8 @@ def loop_damping(loops: Sequence[Actuator]) -> Array:
 class LoopDrive:
     """Position or velocity loops on recorded commands."""
 
-    is_closed = True
-
     def __init__(self, loops: Sequence[Actuator], recording: Recording, time: Array, *, is_damped: bool) -> None:
-        """Put the commands, supplies and gains on the steps.
-
-        `is_damped`: whether torque includes the loops' damping; where not, the plant has it.
-        """
+        """Put commands, supplies and gains on the steps; the plant has the loops' damping unless `is_damped`."""
         self._damped = 1.0 if is_damped else 0.0
         samples = recording.samples()
         reference = samples.reference if samples.reference is not None else samples.effort
@@ -83,7 +73,7 @@ class LoopDrive:
             command = shift_command(samples.time, reference[:, joint], loop.delay or 0.0, loop.rate_hz, time)
             self.command[:, joint] = command if loop.kind == "position" else np.gradient(command, STEP_S)
         self.voltage, self.gain, self.temperature = (
-            None if values is None else np.stack([_onto(samples.time, column, time) for column in values.T], axis=1)
+            None if values is None else _onto(samples.time, values, time)
             for values in (samples.voltage, samples.gain, samples.temperature)
         )
 
@@ -105,13 +95,11 @@ class LoopDrive:
 class TorqueDrive:
     """Recorded torque, and a stabiliser that draws the simulated arm to the real one."""
 
-    is_closed = False
-
     def __init__(self, robot: Robot, recording: Recording, motion: RecordedMotion, inertia: Array) -> None:
         samples = recording.samples()
         effort = samples.effort if samples.effort_command is None else samples.effort_command
         torque = recording.joint_torque(effort, robot)
-        self._torque = np.stack([_onto(samples.time, column, motion.time) for column in torque.T], axis=1)
+        self._torque = _onto(samples.time, torque, motion.time)
         self._motion = motion
         self._stiffness, self._damping = inertia * STABILISER_RAD_S**2, 2.0 * inertia * STABILISER_RAD_S
         self.squares, self.steps = np.zeros(len(inertia)), 0
@@ -132,8 +120,8 @@ class TorqueDrive:
 
 
 def _onto(time: Array, values: Array, at: Array) -> Array:
-    known = np.isfinite(values)
-    return np.interp(at, time[known], values[known]) if known.any() else np.full(len(at), np.nan)
+    """Columns (N, n) at other instants, NaN where all is missed."""
+    return np.stack([put_onto(time, column, at, np.nan) for column in values.T], axis=1)
 
 
 LOST = 1e3  # position error beyond which the simulated arm is lost and held there [rad or m]
@@ -142,12 +130,7 @@ LOST = 1e3  # position error beyond which the simulated arm is lost and held the
 def simulate_motion(
     model: RolloutModel, plant: Plant, drive: Drive, motion: RecordedMotion, horizon_s: float | None
 ) -> Array:
-    """Positions of the simulated arm at the rows of the recording, (N, n) [rad or m].
-
-    Raises TauscopeError where the recording holds no torque for a joint.
-
-    `horizon_s`: time between restarts at the real state [s]; None starts once.
-    """
+    """Simulated positions at a recording's rows, (N, n), restarted every horizon. Raises TauscopeError."""
     steps = len(motion.time)
     every = steps if horizon_s is None else max(round(horizon_s / STEP_S), 1)
     found = np.empty_like(motion.position)

@@ -6,12 +6,13 @@ form M6 of Duclusaud et al. (ICRA 2025).
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from tauscope.dynamics.friction import smooth_sign
 from tauscope.effects import Signals
-from tauscope.export.compensation import JointFriction
+from tauscope.export.compensation.model import JointFriction
 from tauscope.export.model import ExportModel, FoundEffect
 from tauscope.recording.recording import Array
 
@@ -28,11 +29,7 @@ class LoadFriction:
     braking: Array  # (n,) or (n, 1, V), μ_b [1]
 
     def level(self, load: Array, direction: Array) -> Array:
-        """Level of dry friction.
-
-        `load`: (n,) or (n, S, V), torque of the rigid body [Nm or N]; `direction`: (n,) or (n, S, V), sign of the
-        motion. Returns (n,) or (n, S, V) [Nm or N].
-        """
+        """Level of dry friction at `load` [Nm or N] for the sign `direction`; all (n,) or (n, S, V)."""
         size = np.abs(load)
         return np.where(direction * load > 0.0, self.driving * size, self.braking) * size
 
@@ -55,43 +52,33 @@ class JointLaws:
         has_offset: tuple[bool, ...],
         friction_by_load: LoadFriction | None = None,
     ) -> None:
-        """Take a model.
-
-        `effects`: that the MJCF does not hold and whose torque follows from position, velocity and load.
-        `held`: (n,), dry friction that the MJCF's bristles hold [Nm or N].
-        `has_offset`: joints whose constant torque the MJCF holds.
-        `friction_by_load`: of a refinement.
-        """
+        """Take a model, `effects` and offsets beside the MJCF; `held`: (n,), dry friction that its bristles hold."""
         friction: tuple[JointFriction, ...] = model.friction
         self._stiction = np.array([each.stiction for each in friction])
         self._stribeck = np.array([each.stribeck for each in friction])
         self._delta = np.array([each.delta or 0.0 for each in friction])
         self._offset = np.array([0.0 if has else each.offset for each, has in zip(friction, has_offset, strict=True)])
         self._held, self._effects, self._by_load = held, effects, friction_by_load
-        count = model.robot.joint_count
-        zeros = np.zeros((count, 1))
+        names, shape = ("position", "velocity", "acceleration", "load", "torque", "step"), (model.robot.joint_count, 1)
+        at_rest: dict[str, Any] = {name: np.zeros(shape) for name in names}
+        bodies = np.concatenate([link.to_vector() for link in model.links])
         self._signals = Signals(
             robot=model.robot,
             rate_hz=1.0,
             time=np.zeros((1, 1)),
             recording=0,
-            position=zeros.copy(),
-            velocity=zeros.copy(),
-            acceleration=zeros.copy(),
-            load=zeros.copy(),
-            torque=zeros.copy(),
-            step=zeros.copy(),
+            **at_rest,
             steepness=np.array([each.k_v for each in friction]),
-            bodies=np.concatenate([link.to_vector() for link in model.links]),
-            links=np.concatenate([link.to_vector() for link in model.links]),
+            bodies=bodies,
+            links=bodies,
             periodic=False,
         )
 
     def __call__(self, position: Array, velocity: Array, load: Array, drive: Array) -> tuple[Array, Array]:
-        """Levels of dry friction, and torque against the motion beside them.
+        """Levels of dry friction, and torque against the motion beside them, (n,) each [Nm or N].
 
-        `position`, `velocity`: (n,), q, q̇; `load`: (n,), torque of the rigid body [Nm or N]; `drive`: (n,), torque of
-        the drive, which gives a resting joint its direction [Nm or N]. Returns (n,), (n,) [Nm or N].
+        `position`, `velocity`: (n,), q, q̇; `load`: (n,), torque of the rigid body; `drive`: (n,), torque of the drive,
+        which gives a resting joint its direction [Nm or N].
         """
         level = self._stiction + self._stribeck * smooth_sign(np.abs(velocity), self._delta)
         torque = self._offset.copy()
@@ -105,15 +92,9 @@ class JointLaws:
         return np.maximum(level - self._held, 0.0), torque
 
     def _evaluate(self, position: Array, velocity: Array, load: Array, step: Array) -> Array:
-        now = replace(
-            self._signals,
-            position=position[:, None],
-            velocity=velocity[:, None],
-            load=load[:, None],
-            step=step[:, None],
-            of_motion={},
-            _memory={},
-        )
+        state = {"position": position, "velocity": velocity, "load": load, "step": step}
+        columns = {name: values[:, None] for name, values in state.items()}
+        now = replace(self._signals, **columns, of_motion={}, _memory={})
         total = np.zeros(len(position))
         for found in self._effects:
             (columns,) = found.effect.columns(now, found.shape[None])

@@ -6,12 +6,12 @@ from datetime import UTC, datetime
 import numpy as np
 
 from tauscope.closed_loop.laws import JointLaws, LoadFriction
-from tauscope.export.compensation import JointFriction
+from tauscope.export.compensation.model import JointFriction
 from tauscope.export.mjcf import to_mjcf
 from tauscope.export.mjcf_findings import IN_THE_MODEL, add_findings
 from tauscope.export.model import ExportModel, Origin
 from tauscope.recording import EffortKind
-from tauscope.robot import LinkInertia, Robot
+from tauscope.robot import FrictionCoefficients, LinkInertia, Robot
 
 # Mass added to stated links, relative to the arm's: MuJoCo moves no body without mass, and no rod without width.
 TRACE_SHARE = 1e-6
@@ -39,27 +39,14 @@ def stated_model(robot: Robot) -> ExportModel | None:
     count = robot.joint_count
     mass = TRACE_SHARE * sum(link.mass for link in stated.links)
     trace = LinkInertia(mass, np.zeros(3), mass * TRACE_RADIUS_M**2 * np.eye(3))
-    friction = stated.friction or ()
-    frictions = [
-        JointFriction(
-            friction[joint].stiction if friction else 0.0,
-            friction[joint].stribeck if friction else 0.0,
-            friction[joint].viscous if friction else 0.0,
-            0.0,
-            robot.joints[joint].friction_shape.k_v or UNUSED_K_V,
-            robot.joints[joint].friction_shape.delta,
-        )
-        for joint in range(count)
-    ]
-    return ExportModel(
-        robot=replace(robot, segment_names=()),
-        links=tuple(LinkInertia.from_vector(link.to_vector() + trace.to_vector()) for link in stated.links),
-        friction=tuple(frictions),
-        delivered_friction=tuple(frictions),
-        rotor_inertia=stated.rotor_inertia or (None,) * count,
-        effects=(),
-        origin=Origin((), EffortKind.TORQUE, datetime.now(UTC)),
+    friction = stated.friction or (FrictionCoefficients(),) * count
+    frictions = tuple(
+        JointFriction(own.stiction, own.stribeck, own.viscous, 0.0, shape.k_v or UNUSED_K_V, shape.delta)
+        for own, shape in zip(friction, (joint.friction_shape for joint in robot.joints), strict=True)
     )
+    links = tuple(LinkInertia.from_vector(link.to_vector() + trace.to_vector()) for link in stated.links)
+    rotors, origin = stated.rotor_inertia or (None,) * count, Origin((), EffortKind.TORQUE, datetime.now(UTC))
+    return ExportModel(replace(robot, segment_names=()), links, frictions, frictions, rotors, (), origin)
 
 
 def rollout_model(name: str, model: ExportModel, friction_by_load: LoadFriction | None = None) -> RolloutModel:

@@ -2,16 +2,9 @@
 
 from matplotlib.figure import Figure
 
+from tauscope.closed_loop import tables
 from tauscope.closed_loop.result import RolloutDocument
 from tauscope.closed_loop.rollout import Rollout, Trace
-from tauscope.closed_loop.tables import (
-    MILLI,
-    MODEL_WORDS,
-    recording_table,
-    refinement_table,
-    rollout_sentences,
-    summary_table,
-)
 from tauscope.number_text import counted, significant
 from tauscope.report.curves import envelope_indices
 from tauscope.report.figures import plot_envelope
@@ -32,9 +25,9 @@ def rollout_page(rollout: Rollout, provenance: Provenance) -> str:
     worst = max(rollout.traces, key=lambda trace: max(trace.entry.models[-1].rms))
     names = [joint.name for joint in rollout.robot.joints]
     parts = [_motion(worst, joint, name) for joint, name in enumerate(names)]
-    errors = [Part(table=summary_table(document)), Part(table=recording_table(document))]
+    errors = [Part(table=tables.summary_table(document)), Part(table=tables.recording_table(document))]
     refined = document.refinement
-    refinement = [] if refined is None else [Part(table=refinement_table(refined))]
+    refinement = [] if refined is None else [Part(table=tables.refinement_table(refined))]
     sections = [
         Section("errors", "Position error", errors),
         *([Section("refinement", "Refined parameters", refinement)] if refinement else []),
@@ -47,7 +40,7 @@ def rollout_page(rollout: Rollout, provenance: Provenance) -> str:
             robot=document.robot,
             facts=[*counts, "closed loop in MuJoCo"],
             key_figures=_key_figures(document),
-            sentences=list(rollout_sentences(document)),
+            sentences=list(tables.rollout_sentences(document)),
             cautions=[warning.sentence for warning in document.warnings],
             story=sections,
             provenance=provenance,
@@ -59,8 +52,10 @@ def _key_figures(document: RolloutDocument) -> list[KeyFigure]:
     figures = []
     for entry in document.summary:
         place = max(range(len(entry.rms)), key=entry.rms.__getitem__)
-        value = f"{significant(MILLI * entry.rms[place], 3)} mrad"
-        figures.append(KeyFigure(MODEL_WORDS[entry.model].capitalize(), value, f"rms at {document.joints[place]}"))
+        value = f"{significant(tables.MILLI * entry.rms[place], 3)} mrad"
+        figures.append(
+            KeyFigure(tables.MODEL_WORDS[entry.model].capitalize(), value, f"rms at {document.joints[place]}")
+        )
     return figures
 
 
@@ -72,9 +67,9 @@ def _motion(trace: Trace, joint: int, name: str) -> Part:
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.7, 1.0))
         plot_envelope(above, time, real, MOST_POINTS, color=MEASURED, linewidth=0.9, label="real")
         for model, curve in curves.items():
-            style = {"color": COLOURS[model], "linewidth": 1.0, "label": MODEL_WORDS[model]}
+            style = {"color": COLOURS[model], "linewidth": 1.0, "label": tables.MODEL_WORDS[model]}
             plot_envelope(above, time, curve, MOST_POINTS, **style)
-            plot_envelope(below, time, MILLI * (curve - real), MOST_POINTS, color=COLOURS[model], linewidth=0.7)
+            plot_envelope(below, time, tables.MILLI * (curve - real), MOST_POINTS, color=COLOURS[model], linewidth=0.7)
         above.set_ylabel("position [rad, m]")
         above.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.0, borderpad=0.2)
         below.set_ylabel("error [mrad, mm]")

@@ -1,6 +1,6 @@
 """The simulator of a rollout, found by its entry point: MuJoCo is in the ``sim`` extra."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import entry_points
 from typing import Protocol, cast
 
@@ -40,21 +40,14 @@ class Plant(Protocol):
         ...
 
 
-class PlantMaker(Protocol):
-    """Compiles an MJCF to a plant."""
-
-    def __call__(self, mjcf: str, joints: Sequence[str], step_s: float, damping: Array) -> Plant:
-        """The plant with these driven joints, base first; damping is that of their loops (n,)."""
-        ...
+# Makes a plant of an MJCF, its driven joints, base first, the step [s], and the damping of their loops, (n,).
+PlantMaker = Callable[[str, Sequence[str], float, Array], Plant]
 
 
 def make_plant(mjcf: str, joints: Sequence[str], damping: Array) -> Plant:
-    """The plant of an MJCF.
+    """The plant of an MJCF; `damping`: (n,), torque per velocity of the loops, integrated implicitly.
 
-    Raises MissingExtraError where MuJoCo is not installed. Raises TauscopeError where no simulator is registered.
-
-    `damping`: (n,), torque per velocity of the loops, which MuJoCo integrates implicitly as it does an actuator's kv
-    [Nm s/rad or N s/m].
+    Raises MissingExtraError without MuJoCo, and TauscopeError where no simulator is registered.
     """
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         with require_extra("tauscope rollout"):

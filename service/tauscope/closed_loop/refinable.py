@@ -48,7 +48,8 @@ class RefinableModel:
         self._rotor = np.array([value or 0.0 for value in model.rotor_inertia])
         is_open = any(loop.unit == "register" for loop in loops) and not any(loop.temperature_slope for loop in loops)
         self._is_warmed = segments.warmth is not None and is_open
-        self.terms = (*self._body_terms(), *self._friction_terms(), *self._warmth_terms())
+        loss = Term("loss of torque per volt", "1/K", WARM_LOSS, WARM_LOSS_STD, WARM_LOSS_STD)
+        self.terms = (*self._body_terms(), *self._friction_terms(), *([loss] if self._is_warmed else []))
 
     def _body_terms(self) -> list[Term]:
         robot = self._model.robot
@@ -79,10 +80,6 @@ class RefinableModel:
                 Term(f"braking friction {joint.name}", "1", 0.0, STEP, least=0.0, is_optional=True),
             ]
         return terms
-
-    def _warmth_terms(self) -> list[Term]:
-        loss = Term("loss of torque per volt", "1/K", WARM_LOSS, WARM_LOSS_STD, WARM_LOSS_STD)
-        return [loss] if self._is_warmed else []
 
     def clip(self, values: Array) -> Array:
         """Parameters within their bounds. `values`: (..., P). Returns (..., P)."""

@@ -37,11 +37,7 @@ class RefinedTerm:
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """A refined model.
-
-    `left_out`: terms that are not significant.
-    `before`, `after`: rms position error of the segments over all joints [rad or m].
-    """
+    """A refined model; `before`, `after`: rms position error of the segments over all joints [rad or m]."""
 
     model: ExportModel
     friction: LoadFriction
@@ -59,12 +55,7 @@ def refine_model(
     recordings: Sequence[Recording],
     progress: Callable[[str], None] = lambda step: None,
 ) -> Refined:
-    """Refine a model on recordings with commands; terms of friction by load that are not significant are left out.
-
-    Raises RecordingError where no recording is long enough.
-
-    `model`: without findings; `loops`: one a joint, with their delays.
-    """
+    """Refine a model without findings by `loops` with delays. Raises RecordingError where no motion is long enough."""
     arm = RefinableModel(model, tuple(loops), Segments.of(recordings, loops))
     progress(f"refine {len(arm.terms)} parameters on {arm.segments.count} segments")
     optional = np.array([term.is_optional for term in arm.terms])
@@ -103,10 +94,7 @@ def _rms(errors: Array) -> float:
 
 
 def _minimise(arm: RefinableModel, values: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Levenberg-Marquardt over the free parameters; the minimum (P,) and standard errors (P,), zero where not free.
-
-    σ of each joint is the rms error at the present step.
-    """
+    """Levenberg-Marquardt over the free parameters: minimum and standard errors, (P,), σ by the present step."""
     terms, index = arm.terms, np.flatnonzero(free)
     scale = np.array([term.scale for term in terms])[index]
     start = np.array([term.start for term in terms])[index]

@@ -6,15 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauscope.actuation import estimate_delays, is_open, require_loops
-from tauscope.closed_loop.drive import (
-    Drive,
-    LoopDrive,
-    RecordedMotion,
-    TorqueDrive,
-    loop_damping,
-    record_motion,
-    simulate_motion,
-)
+from tauscope.closed_loop import drive as drives
 from tauscope.closed_loop.model import RolloutModel, rollout_model, stated_model
 from tauscope.closed_loop.plant import STEP_S, make_plant
 from tauscope.closed_loop.refine import Refined, refine_model
@@ -33,8 +25,14 @@ from tauscope.recording import Recording
 from tauscope.recording.recording import Array, take_commands
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import Actuator, Robot
+from tauscope.strict_model import take_fields
 
 HORIZONS_S = (0.1, 1.0, 10.0)  # times between restarts at the real state [s]: one command, one move, one task
+STABILISED = ResultWarning(
+    code="stabiliser",
+    text="no loop is stated, or commands are missing: recorded torque drives the arm, and a stabiliser holds it",
+    remedy="state joints[].actuator and record qref; compare torque of the stabiliser with that of the joint",
+)
 Progress = Callable[[str], None]
 
 
@@ -42,7 +40,7 @@ Progress = Callable[[str], None]
 class Trace:
     """One recording and its simulations."""
 
-    motion: RecordedMotion
+    motion: drives.RecordedMotion
     simulated: dict[str, Array]  # dict of str to (N, n), positions by model, from one start [rad or m]
     entry: RecordingEntry
 
@@ -84,10 +82,7 @@ class Rollout:
             rms_after=refined.after,
             is_better=bool(own < min(others)),
             parameters=[
-                RefinedEntry(
-                    name=each.term.name, value=each.value, std=each.std, unit=each.term.unit, p_value=each.p_value
-                )
-                for each in refined.terms
+                take_fields(RefinedEntry, each, name=each.term.name, unit=each.term.unit) for each in refined.terms
             ],
             left_out=list(refined.left_out),
         )
@@ -105,13 +100,10 @@ def roll_out(
     progress: Progress = lambda step: None,
     training: Sequence[Recording] = (),
 ) -> Rollout:
-    """Simulate what a recording commanded, without and with the findings of a model.
+    """Simulate what a recording commanded, without and with a model's findings. `exports`: as `read_export_models`.
 
-    Raises RecordingMismatchError where the model is of another arm, or nothing states a model. Raises TauscopeError
-    where a recording holds neither commands for loops nor torque, or there is no simulator.
-
-    `exports`: of a model file, as `read_export_models` reads it; empty where the robot file's own model is judged
-    alone; `training`: with commands, by which the model without findings is refined; the other recordings judge it.
+    Raises RecordingMismatchError for another arm's model or none, TauscopeError without commands, torque or simulator.
+    `training`: with commands, by which the model without findings is refined; the other recordings judge it.
     """
     models = _models(robot, exports)
     known = exports[-1].robot if exports else None
@@ -122,28 +114,32 @@ def roll_out(
         refined = _refine(_plain_model(robot, exports), loops, training, progress)
         models.append(rollout_model("refined", refined.model, refined.friction))
     # MuJoCo integrates an actuator's damping implicitly; a servo computes it of the velocity that it has measured.
-    damping = loop_damping(loops) if loops and robot.mjcf is not None else np.zeros(robot.joint_count)
+    damping = drives.loop_damping(loops) if loops and robot.mjcf is not None else np.zeros(robot.joint_count)
     plants = [make_plant(model.mjcf, model.joints, damping) for model in models]
     traces = []
     for recording in recordings:
         progress(f"simulate {recording.name}")
-        motion = record_motion(recording)
+        motion = drives.record_motion(recording)
         entries, simulated = [], {}
         for model, plant in zip(models, plants, strict=True):
             runs: dict[float | None, Array] = {}
             stabiliser = None
             for horizon in (*(h for h in HORIZONS_S if h < motion.time[-1] - motion.time[0]), None):
                 own = loops if refined is None or model.name != "refined" else refined.loops
-                drive = _drive(robot, recording, motion, model, own)
-                runs[horizon] = simulate_motion(model, plant, drive, motion, horizon)
-                stabiliser = drive.stabiliser_rms.tolist() if isinstance(drive, TorqueDrive) else None
+                drive = (
+                    drives.LoopDrive(own, recording, motion.time, is_damped=robot.mjcf is None)
+                    if own
+                    else drives.TorqueDrive(robot, recording, motion, model.inertia)
+                )
+                runs[horizon] = drives.simulate_motion(model, plant, drive, motion, horizon)
+                stabiliser = drive.stabiliser_rms.tolist() if isinstance(drive, drives.TorqueDrive) else None
             simulated[model.name] = runs[None]
             entries.append(_entry(model.name, motion, runs, stabiliser))
         length = float(motion.rows[-1] - motion.rows[0])
         traces.append(
             Trace(motion, simulated, RecordingEntry(recording=recording.name, duration_s=length, models=entries))
         )
-    warnings = (*_warn_drive(is_closed=is_closed), *(w for recording in recordings for w in recording.warnings))
+    warnings = (*(() if is_closed else (STABILISED,)), *(w for recording in recordings for w in recording.warnings))
     return Rollout(robot, is_closed, tuple(models), tuple(traces), warnings, refined)
 
 
@@ -208,14 +204,6 @@ def _fill(loop: Actuator, known: Actuator) -> Actuator:
     )
 
 
-def _drive(
-    robot: Robot, recording: Recording, motion: RecordedMotion, model: RolloutModel, loops: tuple[Actuator, ...]
-) -> Drive:
-    if loops:
-        return LoopDrive(loops, recording, motion.time, is_damped=robot.mjcf is None)
-    return TorqueDrive(robot, recording, motion, model.inertia)
-
-
 def _plain_model(robot: Robot, exports: Sequence[ExportModel]) -> ExportModel | None:
     if not exports:
         return stated_model(robot)
@@ -237,7 +225,7 @@ def _refine(
 
 
 def _entry(
-    name: str, motion: RecordedMotion, runs: dict[float | None, Array], stabiliser: list[float] | None
+    name: str, motion: drives.RecordedMotion, runs: dict[float | None, Array], stabiliser: list[float] | None
 ) -> ModelEntry:
     real, free = motion.measured, runs[None]
     turned = _reversal_error(motion.rows, real, free, motion.time, motion.velocity)
@@ -262,11 +250,7 @@ MOVES = 0.05  # share of its top speed above which a joint moves: below it, it m
 
 
 def _lag(time: Array, measured: Array, simulated: Array) -> Array:
-    """Delay of the real motion behind the simulated one, (n,) [s]: that at which both differ least.
-
-    `time`: (N,) [s]; `measured`, `simulated`: (N, n), q of the real and of the simulated arm [rad or m]; NaN where it
-    was missed.
-    """
+    """Delay of the real motion behind the simulated one, (n,) [s]: that at which both differ least."""
     step = float(np.median(np.diff(time)))
     reach = int(LONGEST_LAG_S / step)
     found = np.zeros(measured.shape[1])
@@ -277,24 +261,17 @@ def _lag(time: Array, measured: Array, simulated: Array) -> Array:
     for joint in range(measured.shape[1]):
         real, other = measured[:, joint], simulated[:, joint]
         errors = np.array([np.nanmean((real[at] - other[at - shift]) ** 2) for shift in shifts])
-        best = int(np.argmin(errors))
+        best, between = int(np.argmin(errors)), 0.0
         if 0 < best < len(shifts) - 1:
             before, least, after = errors[best - 1 : best + 2]
             bend = before - 2.0 * least + after
-            found[joint] = step * (shifts[best] + (0.5 * (before - after) / bend if bend > 0.0 else 0.0))
-        else:
-            found[joint] = step * shifts[best]
+            between = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
+        found[joint] = step * (shifts[best] + between)
     return found
 
 
 def _reversal_error(rows: Array, measured: Array, simulated: Array, time: Array, velocity: Array) -> Array:
-    """Rms of the position error within `REVERSAL_S` of a reversal of the real joint, (n,) [rad or m]; NaN without one.
-
-    `rows`: (N,), instants of both positions [s].
-    `measured`, `simulated`: (N, n), q of the real and of the simulated arm [rad or m]; NaN where it was missed.
-    `time`: (K,), instants of the velocity [s].
-    `velocity`: (K, n), of the real arm [rad/s or m/s].
-    """
+    """Rms position error within `REVERSAL_S` of a reversal of the real joint, (n,) [rad or m]; NaN without one."""
     found = np.full(measured.shape[1], np.nan)
     for joint, speed in enumerate(velocity.T):
         moving = np.flatnonzero(np.abs(speed) > MOVES * np.abs(speed).max())
@@ -310,11 +287,3 @@ def _reversal_error(rows: Array, measured: Array, simulated: Array, time: Array,
         if np.isfinite(error).any():
             found[joint] = float(np.sqrt(np.nanmean(error**2)))
     return found
-
-
-def _warn_drive(*, is_closed: bool) -> tuple[ResultWarning, ...]:
-    if is_closed:
-        return ()
-    text = "no loop is stated, or commands are missing: recorded torque drives the arm, and a stabiliser holds it"
-    remedy = "state joints[].actuator and record qref; compare torque of the stabiliser with that of the joint"
-    return (ResultWarning(code="stabiliser", text=text, remedy=remedy),)

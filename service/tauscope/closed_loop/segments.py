@@ -23,19 +23,14 @@ MOST_SEGMENTS = 120  # segments that are simulated side by side, evenly chosen
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """Motion and commands of S segments of K steps.
-
-    `command`: (K, n, S), of the loops.
-    `voltage`, `gain`, `temperature`: (K, n, S), of the loops; temperature is NaN where it was not recorded [V, register
-        or Nm/rad, °C].
-    """
+    """Motion and commands of S segments of K steps."""
 
     position: Array  # (K, n, S), q of the real arm; NaN where it was missed [rad or m]
     begin: Array  # (n, S), q̇ at the first step [rad/s or m/s]
-    command: Array
-    voltage: Array
-    gain: Array
-    temperature: Array
+    command: Array  # (K, n, S), of the loops
+    voltage: Array  # (K, n, S), of the loops [V]
+    gain: Array  # (K, n, S) [register or Nm/rad]
+    temperature: Array  # (K, n, S) [°C]; NaN where it was not recorded
 
     @property
     def count(self) -> int:

@@ -16,12 +16,7 @@ LEAST_P = 1e-3  # p below which its size says nothing
 def summary_table(document: RolloutDocument) -> Table:
     """Mean rms and largest error of every joint by model, in mrad."""
     rows = [
-        (
-            joint,
-            MODEL_WORDS[entry.model],
-            significant(MILLI * entry.rms[place], 3),
-            significant(MILLI * entry.worst[place], 3),
-        )
+        (joint, MODEL_WORDS[entry.model], _milli(entry.rms[place]), _milli(entry.worst[place]))
         for place, joint in enumerate(document.joints)
         for entry in document.summary
     ]
@@ -30,44 +25,26 @@ def summary_table(document: RolloutDocument) -> Table:
 
 def recording_table(document: RolloutDocument) -> Table:
     """Errors by recording, joint and model: by time between restarts, at reversals, and the lag."""
-    horizons: list[float] = []
-    for recording in document.recordings:
-        for entry in recording.models[0].horizons:
-            if entry.horizon_s is not None and entry.horizon_s not in horizons:
-                horizons.append(entry.horizon_s)
+    entries = [entry for recording in document.recordings for entry in recording.models[0].horizons]
+    horizons = sorted({entry.horizon_s for entry in entries if entry.horizon_s is not None})
     rows = []
     for recording in document.recordings:
         for place, joint in enumerate(document.joints):
             for entry in recording.models:
                 by_horizon = {each.horizon_s: each.rms[place] for each in entry.horizons}
-                turned = entry.reversals[place]
-                rows.append(
-                    (
-                        recording.recording,
-                        joint,
-                        MODEL_WORDS[entry.model],
-                        *(_milli(by_horizon.get(horizon)) for horizon in sorted(horizons)),
-                        _milli(entry.rms[place]),
-                        _milli(turned),
-                        significant(MILLI * entry.lag[place], 2),
-                    )
-                )
-    heads = [f"{horizon:g} s" for horizon in sorted(horizons)]
+                errors = [*map(by_horizon.get, horizons), entry.rms[place], entry.reversals[place]]
+                lag = significant(MILLI * entry.lag[place], 2)
+                rows.append((recording.recording, joint, MODEL_WORDS[entry.model], *map(_milli, errors), lag))
+    heads = [f"{horizon:g} s" for horizon in horizons]
     return Table(("recording", "joint", "model", *heads, "free", "reversals", "lag [ms]"), rows, words=3)
 
 
 def refinement_table(entry: RefinementEntry) -> Table:
     """Refined parameters with their standard errors, and p of no such term."""
-    rows = [
-        (
-            each.name,
-            significant(each.value, 3),
-            significant(each.std, 2),
-            each.unit,
-            ABSENT if each.p_value is None else "< 0.001" if each.p_value < LEAST_P else f"{each.p_value:.3f}",
-        )
-        for each in entry.parameters
-    ]
+    rows = []
+    for each in entry.parameters:
+        p_value = ABSENT if each.p_value is None else "< 0.001" if each.p_value < LEAST_P else f"{each.p_value:.3f}"
+        rows.append((each.name, significant(each.value, 3), significant(each.std, 2), each.unit, p_value))
     return Table(("parameter", "value", "± std", "unit", "p"), rows, words=1)
 
 
@@ -78,7 +55,8 @@ def rollout_sentences(document: RolloutDocument) -> Iterator[str]:
         yield f"MuJoCo gets the recorded commands through the stated loops; delay {delays} ms."
     else:
         yield "MuJoCo gets the recorded torque, and a stabiliser of 1 Hz draws it to the recorded motion."
-        largest = [max(values) for values in _stabilisers(document)]
+        models = [entry for recording in document.recordings for entry in recording.models]
+        largest = [max(entry.stabiliser_rms) for entry in models if entry.stabiliser_rms]
         if largest:
             yield f"The stabiliser's torque is at most {significant(max(largest), 2)} Nm or N rms."
     first, last = document.summary[0], document.summary[-1]
@@ -104,13 +82,6 @@ def _refinement_sentences(entry: RefinementEntry) -> Iterator[str]:
         yield "On the judging recordings the refined model is the best: use it."
     else:
         yield "On the judging recordings another model is better: do not use the refined one."
-
-
-def _stabilisers(document: RolloutDocument) -> Iterator[list[float]]:
-    for recording in document.recordings:
-        for entry in recording.models:
-            if entry.stabiliser_rms:
-                yield entry.stabiliser_rms
 
 
 def _milli(value: float | None) -> str:

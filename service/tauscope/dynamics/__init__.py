@@ -1,20 +1,13 @@
 """Torque = regressor × parameters: the regressor, base parameters, rigid-body dynamics and friction columns."""
 
 from tauscope.dynamics.base_parameters import BaseParameters, base_parameters
-from tauscope.dynamics.friction import (
-    friction_columns,
-    friction_torque,
-    smooth_sign,
-    smooth_sign_slope,
-)
-from tauscope.dynamics.regressor import TorqueRegressor, torque_regressor
+from tauscope.dynamics.friction import friction_torque, smooth_sign, smooth_sign_slope
+from tauscope.dynamics.regressor import torque_regressor
 from tauscope.dynamics.rigid_body import gravity_torque, inverse_dynamics, mass_matrix
 
 __all__ = [
     "BaseParameters",
-    "TorqueRegressor",
     "base_parameters",
-    "friction_columns",
     "friction_torque",
     "gravity_torque",
     "inverse_dynamics",

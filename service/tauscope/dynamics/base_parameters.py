@@ -19,45 +19,35 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.dynamics.chain_step import Array, euler_zxz, from_euler_zxz
+from tauscope.dynamics.chain_step import Array, euler_zxz
 from tauscope.dynamics.regressor import torque_regressor
+from tauscope.robot.kinematics import rotation_about
 from tauscope.robot.robot import STANDARD_PARAMETERS, JointType, Placement, Robot
 
 Columns = NDArray[np.intp]
 
-RIGHT_ANGLE = 1e-5
-"""Angles this close to a right one are meant to be right [rad]: 1.5708 is 3.7e-6 off."""
-
-_LENGTH = 1e-6
-"""Lengths below this are rounding of the file [m]."""
-
+RIGHT_ANGLE = 1e-5  # angles this close to a right one are meant to be right [rad]: 1.5708 is 3.7e-6 off
+_LENGTH = 1e-6  # lengths below this are rounding of the file [m]
 _LEADING = (1e-2, 1e-4, 1e-6, 1e-8)
 """Shares of a column, relative to the largest of its unit, that have to be new for it to lead: first choice to last.
 
 Below the last a column is a combination of others, or, where there are none, zero."""
 
-_ROUNDING = 1e-12
-"""Share of the largest column of any unit below which a column is zero: all columns of a unit may be."""
+_ROUNDING = 1e-12  # share of the largest column of any unit below which a column is zero: all columns of a unit may be
+_SHARE = 1e-9  # share of a column below which a term of its combination is rounding
 
-_SHARE = 1e-9
-"""Share of a column below which a term of its combination is rounding."""
-
+# Links 1 to j have 10 j parameters that show at joints 1 to j alone: twenty states give twice as many equations.
 _STATES = 20
-"""Links 1 to j have 10 j parameters that show at joints 1 to j alone: twenty states give twice as many equations."""
 
+# Inertia, mass and first moment: columns of one unit each, comparable in size.
 _UNITS = (slice(0, 6), slice(6, 7), slice(7, 10))
-"""Inertia, mass and first moment: columns of one unit each, comparable in size."""
 
 
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
-    """The base parameters Θ* = Θ_L + B Θ_K of an arm, equation (14), m of them.
+    """The base parameters Θ* = Θ_L + B Θ_K of an arm, equation (14), m of them."""
 
-    `independent_columns`: (m,) int, j_L: the standard parameter that leads each base parameter, counted over all links
-        from 0.
-    """
-
-    independent_columns: Columns
+    independent_columns: Columns  # (m,) int, j_L: the standard parameter that leads each, counted over all links from 0
     dependent_columns: Columns  # (k,) int, j_K: standard parameters that appear in combinations only
     unidentifiable_columns: Columns  # (u,) int, standard parameters that no motion of the arm shows
     combination: Array  # (m, k), B, equation (12)
@@ -68,26 +58,17 @@ class BaseParameters:
     first_links: tuple[int, ...]  # first link that each joint moves, from 0
 
     def is_independent(self, index: int) -> bool:
-        """Whether a base parameter is one standard parameter alone: its row of B is zero.
-
-        `index`: base parameter, from 0.
-        """
+        """Whether base parameter `index` is one standard parameter alone: its row of B is zero."""
         return not np.any(self.combination[index])
 
     def outward(self, joint: int) -> slice:
-        """Base parameters of the links that a joint moves: from its own link's first one to the last of all.
-
-        `joint`: joint index, from 0.
-        """
+        """Base parameters of the links that a joint moves: from its own link's first one to the last of all."""
         return slice(
             int(np.searchsorted(self.independent_columns, len(STANDARD_PARAMETERS) * self.first_links[joint])), None
         )
 
     def project(self, parameters: Array) -> Array:
-        """Values of the base parameters, Θ* = Θ_L + B Θ_K, equation (14).
-
-        `parameters`: (10 n,), Θ, ten standard parameters a link. Returns (m,), Θ*.
-        """
+        """Base parameters Θ* = Θ_L + B Θ_K, (m,), equation (14), of `parameters`, (10 n,)."""
         return parameters[self.independent_columns] + self.combination @ parameters[self.dependent_columns]
 
 
@@ -121,7 +102,8 @@ def _as_meant(robot: Robot) -> Robot:
     def exact(placement: Placement) -> Placement:
         rotation = placement.rotation
         for _ in range(2):  # A tilt made zero leaves one turn of two, which may be nearly right only now.
-            rotation = from_euler_zxz(*(_right_angle(angle) for angle in euler_zxz(rotation)))
+            first, about_x, last = (_right_angle(angle) for angle in euler_zxz(rotation))
+            rotation = rotation_about(2, first) @ rotation_about(0, about_x) @ rotation_about(2, last)
         reach = float(np.linalg.norm(placement.translation))
         return Placement(rotation, _without_small(placement.translation, max(_LENGTH, RIGHT_ANGLE * reach)))
 

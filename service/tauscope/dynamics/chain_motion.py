@@ -30,29 +30,19 @@ import numpy as np
 from tauscope.dynamics.chain_step import ABOUT_Z, Offset, Plane, Step
 from tauscope.robot.robot import Array, Robot
 
-Vectors = tuple[Array, Array, Array]
-"""The x, y and z components, each an array of the same shape."""
-
-_FIRST_SCREW = 3
-"""Rows of a block: ω, ω̇, a, then w_i and v_i of each joint by turns."""
-
-_ALIGNMENT = 64
-"""Bytes of the widest vector register: rows that start elsewhere cost up to twice the time."""
+Vectors = tuple[Array, Array, Array]  # the x, y and z components, each an array of the same shape
+_FIRST_SCREW = 3  # rows of a block: ω, ω̇, a, then w_i and v_i of each joint by turns
+_ALIGNMENT = 64  # bytes of the widest vector register: rows that start elsewhere cost up to twice the time
 
 
 class LinkMotion(NamedTuple):
-    """Motion of link j in link frame j: views that hold until the next link is asked for.
+    """Motion of link j in link frame j: views that hold until the next link is asked for."""
 
-    `screw_angular`, `screw_linear`: three (j, N), w_i and v_i of the j joints met so far.
-    `angular_velocity`, `angular_acceleration`, `acceleration`: three (N,), ω [rad/s], ω̇ [rad/s²], a [m/s²] of the
-        origin, minus gravity.
-    """
-
-    screw_angular: Vectors
-    screw_linear: Vectors
-    angular_velocity: Vectors
-    angular_acceleration: Vectors
-    acceleration: Vectors
+    screw_angular: Vectors  # three (j, N), w_i of the j joints met so far
+    screw_linear: Vectors  # three (j, N), v_i
+    angular_velocity: Vectors  # three (N,), ω [rad/s]
+    angular_acceleration: Vectors  # three (N,), ω̇ [rad/s²]
+    acceleration: Vectors  # three (N,), a of the origin, minus gravity [m/s²]
     products: Vectors  # three (N,), ω_y ω_z, ω_x ω_z, ω_x ω_y [rad²/s²]
     field: tuple[Vectors, Vectors, Vectors]  # three rows of three (N,), M = S(ω̇) + S(ω)² [1/s²]
 
@@ -71,11 +61,7 @@ class ChainMotion:
         self._products = aligned_empty(3, capacity)
 
     def links(self, q: Array, qd: Array, qdd: Array) -> Iterator[LinkMotion]:
-        """Motion of link 1, 2, … n in turn.
-
-        `q`: (n, N), joint position [rad or m], a contiguous row a joint; `qd`: (n, N), joint velocity; `qdd`: (n, N),
-        joint acceleration.
-        """
+        """Motion of link 1, 2, … n in turn; `q`, `qd`, `qdd`: (n, N), a contiguous row a joint."""
         moving = _Frame(self._blocks, self._scratch, self._field, self._products, samples=q.shape[1])
         moving.rest(self._gravity)
         for coupling, step in zip(self._couplings, self._steps, strict=True):

@@ -8,12 +8,11 @@ import numpy as np
 
 from tauscope.robot.robot import Array, JointType, Segment
 
+# The two components that a turn mixes, in the order in which a positive angle leads from one to the other.
 Plane = tuple[int, int]
-"""The two components that a turn mixes, in the order in which a positive angle leads from one to the other."""
 
+# Components of a shift of the origin, each the same for all samples or one a sample.
 Offset = tuple[float | Array, float | Array, float | Array]
-"""Components of a shift of the origin, each the same for all samples or one a sample."""
-
 ABOUT_X: Plane = (1, 2)
 ABOUT_Z: Plane = (0, 1)
 
@@ -21,17 +20,14 @@ ABOUT_Z: Plane = (0, 1)
 class Step:
     """Constants of one segment: turns and offsets before the joint's motion and after it.
 
-    `angle`: turn about the joint's axis that is added to its position, where it is revolute [rad].
-    `turns_before`, `turns_after`: list of (Plane, float, float), constant turns: plane, cosine, sine.
-    `before`: translation of the placement before the joint, in frame j-1 [m].
-    `after`: translation of the placement after the joint, in frame j [m].
+    `turns_before`, `turns_after`: plane, cosine and sine of each; `before`: in frame j-1, `after`: in frame j [m].
     """
 
     def __init__(self, segment: Segment) -> None:
         self.revolute = segment.type is JointType.REVOLUTE
         first, about_x, third = euler_zxz(segment.before.rotation)
         fourth, about_x_after, last = euler_zxz(segment.after.rotation)
-        # The middle turns are about the joint's own axis and merge with its angle.
+        # The middle turns are about the joint's own axis and merge with its angle, where it is revolute [rad].
         self.angle = third + fourth
         middle = [] if self.revolute else [(ABOUT_Z, self.angle)]
         self.turns_before = _turns([(ABOUT_Z, first), (ABOUT_X, about_x), *middle])
@@ -41,19 +37,13 @@ class Step:
         self._axis = _offset(segment.after.rotation[2])
 
     def slid(self, q: Array) -> Offset:
-        """Offset after a prismatic joint, p + ẑ q in frame j.
-
-        `q`: (N,), joint position [m]. Returns three floats or (N,), the components [m].
-        """
+        """Offset after a prismatic joint, p + ẑ q in frame j [m]; `q`: (N,) [m]."""
         x, y, z = (p if along == 0.0 else p + along * q for p, along in zip(self.after, self._axis, strict=True))
         return x, y, z
 
 
 def euler_zxz(rotation: Array) -> tuple[float, float, float]:
-    """Angles of R = Rz(φ) Rx(β) Rz(γ), with φ in [-π/2, π/2], and zero where z stays parallel to z.
-
-    `rotation`: (3, 3), R. Returns tuple of float: φ, β, γ [rad].
-    """
+    """Angles of `rotation` (3, 3) = Rz(φ) Rx(β) Rz(γ), φ in [-π/2, π/2] and zero where z stays parallel to z."""
     first = 0.0
     sine_x, sine_y = rotation[0, 2], -rotation[1, 2]
     if np.hypot(sine_x, sine_y) > _ROUNDING:
@@ -64,20 +54,8 @@ def euler_zxz(rotation: Array) -> tuple[float, float, float]:
     return first, float(np.arctan2(-y[2], rotation[2, 2])), float(np.arctan2(-x[1], x[0]))
 
 
-def from_euler_zxz(first: float, about_x: float, last: float) -> Array:
-    """The rotation R = Rz(φ) Rx(β) Rz(γ). `first`: φ [rad]; `about_x`: β [rad]; `last`: γ [rad]. Returns (3, 3), R."""
-    (c1, c2, c3), (s1, s2, s3) = np.cos([first, about_x, last]), np.sin([first, about_x, last])
-    return np.array(
-        [
-            [c1 * c3 - s1 * c2 * s3, -c1 * s3 - s1 * c2 * c3, s1 * s2],
-            [s1 * c3 + c1 * c2 * s3, -s1 * s3 + c1 * c2 * c3, -c1 * s2],
-            [s2 * s3, s2 * c3, c2],
-        ]
-    )
-
-
+# Below this a sine, cosine or length is rounding (cos π/2 = 6e-17); 1e-8 is a user's own digits and is kept.
 _ROUNDING = 1e-15
-"""Below this a sine, cosine or length is rounding (cos π/2 = 6e-17); 1e-8 is a user's own digits and is kept."""
 
 
 def _turns(angles: list[tuple[Plane, float]]) -> list[tuple[Plane, float, float]]:

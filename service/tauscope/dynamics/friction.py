@@ -5,36 +5,24 @@ import numpy as np
 from tauscope.errors import IdentificationError
 from tauscope.robot.robot import Array, FrictionCoefficients, FrictionShape
 
-FRICTION_COLUMNS = ("stiction", "stribeck", "viscous", "offset")
-"""Names of the columns of `friction_columns`."""
-
+FRICTION_COLUMNS = ("stiction", "stribeck", "viscous", "offset")  # names of the columns of `friction_columns`
 _TWO_OVER_PI = 2.0 / np.pi
 
 
 def smooth_sign(velocity: Array, k_v: float | Array) -> Array:
-    """Smooth sign function S₀(v) = 2/π arctan(K_v v), the seed paper's equation (8).
-
-    `velocity`: (...), v [rad/s or m/s]; `k_v`: float or (...), steepness K_v at rest [s/rad or s/m].
-    """
+    """Smooth sign S₀(v) = 2/π arctan(K_v v), (8); `velocity`, `k_v`: float or (...)."""
     return _TWO_OVER_PI * np.arctan(k_v * velocity)
 
 
 def smooth_sign_slope(velocity: Array, k_v: float | Array) -> Array:
-    """Derivative of S₀ by its steepness, ∂S₀/∂K_v = 2/π v / (1 + (K_v v)²); by δ likewise.
-
-    `velocity`: (...), v [rad/s or m/s]; `k_v`: float or (...), steepness K_v or δ [s/rad or s/m]. Returns (...),
-    ∂S₀/∂K_v [rad/s or m/s].
-    """
+    """∂S₀/∂K_v = 2/π v / (1 + (K_v v)²), and by δ likewise; `velocity`, `k_v`: float or (...)."""
     return _TWO_OVER_PI * velocity / (1.0 + (k_v * velocity) ** 2)
 
 
 def friction_columns(velocity: Array, shape: FrictionShape, *, offset: bool = True) -> Array:
-    """Friction columns of one joint, the seed paper's (9): Φ_fric = [2/π arctan(v K_v), 2/π arctan(v δ), v, 1].
+    """Columns (N, 4 or 3) of one joint, (9): [2/π arctan(v K_v), 2/π arctan(v δ), v, 1]; `velocity`: (N,).
 
-    Raises IdentificationError: K_v or δ is not given.
-
-    `velocity`: (N,), v [rad/s or m/s]; `shape`: K_v and δ, both given [s/rad or s/m]. Returns (N, 4) or (N, 3), columns
-    of τ_s, τ_sc, τ_v and the offset, as in `FRICTION_COLUMNS`.
+    Raises IdentificationError where K_v or δ is not given.
     """
     k_v, delta = _given(shape)
     columns = np.empty((4 if offset else 3, len(velocity))).T
@@ -47,12 +35,9 @@ def friction_columns(velocity: Array, shape: FrictionShape, *, offset: bool = Tr
 
 
 def friction_torque(coefficients: FrictionCoefficients, shape: FrictionShape, velocity: Array) -> Array:
-    """Friction torque τ_f = τ_s S₀(v) + τ_sc 2/π arctan(v δ) + τ_v v, the seed paper's equation (7).
+    """Friction torque (N,), (7): τ_f = τ_s S₀(v) + τ_sc 2/π arctan(v δ) + τ_v v; `velocity`: (N,).
 
-    The paper prints (7) without the v of its last term; (9) has it. Raises IdentificationError: K_v or δ is not given.
-
-    `shape`: K_v and δ, both given [s/rad or s/m]; `velocity`: (N,), v [rad/s or m/s]. Returns (N,), τ_f, which the
-    drive has to overcome [Nm or N].
+    The paper prints (7) without the v of its last term; (9) has it. Raises IdentificationError without K_v or δ.
     """
     weights = np.array([coefficients.stiction, coefficients.stribeck, coefficients.viscous])
     return friction_columns(velocity, shape, offset=False) @ weights

@@ -30,23 +30,18 @@ from tauscope.robot.robot import STANDARD_PARAMETERS, Robot
 
 Columns = NDArray[np.intp]
 
+# Samples worked on at once: long enough that the calls cost little, short enough that the work stays in the cache.
 CHUNK = 3400
-"""Samples worked on at once: long enough that the calls cost little, short enough that the work stays in the cache."""
 
+# Bytes from which the C library always asks for new pages: they are zero, and cost nothing where they stay so.
 _FRESH_MEMORY = 2**25
-"""Bytes from which the C library always asks for new pages: they are zero, and cost nothing where they stay so."""
-
 _PER_LINK = len(STANDARD_PARAMETERS)
 
 
 def torque_regressor(robot: Robot, q: Array, qd: Array, qdd: Array, *, columns: Columns | None = None) -> Array:
-    """Regressor Φ of τ = Φ(q, q̇, q̈) Θ, the seed paper's equation (2).
+    """Regressor Φ of τ = Φ(q, q̇, q̈) Θ, the seed paper's equation (2); `q`, `qd`, `qdd`: (N, n) [SI].
 
-    `q`: (N, n), joint position [rad or m].
-    `qd`: (N, n), joint velocity [rad/s or m/s].
-    `qdd`: (N, n), joint acceleration [rad/s² or m/s²].
-    `columns`: (C,) int, the standard parameters wanted, ascending, counted over all links from 0; all of them where
-        None.
+    `columns`: (C,) int, standard parameters wanted, ascending, over all links from 0; all of them where None.
     Returns (N, n, C), Φ, a view of a C-contiguous (n, C, N) array: samples are adjacent in memory.
     """
     regressor = TorqueRegressor(robot, columns=columns, chunk=min(CHUNK, max(len(q), 1)))
@@ -61,11 +56,7 @@ def torque_regressor(robot: Robot, q: Array, qd: Array, qdd: Array, *, columns: 
 
 
 class TorqueRegressor:
-    """The torque regressor of one robot with its work buffers, for callers that go through a recording in pieces.
-
-    `columns`: (C,) int, the standard parameters wanted, ascending, counted over all links from 0; all of them where
-        None.
-    """
+    """The torque regressor of one robot with its work buffers, to go through a recording in pieces."""
 
     def __init__(self, robot: Robot, *, columns: Columns | None = None, chunk: int = CHUNK) -> None:
         wanted = np.arange(_PER_LINK * robot.link_count) if columns is None else np.asarray(columns)
@@ -79,25 +70,13 @@ class TorqueRegressor:
         self._columns = [[(int(at), _COLUMNS[wanted[at] % _PER_LINK]) for at in of_link] for of_link in places]
 
     def write(self, q: Array, qd: Array, qdd: Array, out: Array) -> None:
-        """Write Φ into the caller's buffer.
-
-        `q`: (N, n), joint position [rad or m].
-        `qd`: (N, n), joint velocity.
-        `qdd`: (N, n), joint acceleration.
-        `out`: (n, C, N), receives Φ, samples on the last axis.
-        """
+        """Write Φ into `out`, (n, C, N), samples on the last axis; `q`, `qd`, `qdd`: (N, n) [SI]."""
         for joint, inner in enumerate(self._inner_columns):
             out[joint, :inner] = 0.0
         self.write_shares(q, qd, qdd, out)
 
     def write_shares(self, q: Array, qd: Array, qdd: Array, out: Array) -> None:
-        """Write Φ except where it is always zero (joints beyond the link): into zeros, or a buffer used before.
-
-        `q`: (N, n), joint position [rad or m].
-        `qd`: (N, n), joint velocity.
-        `qdd`: (N, n), joint acceleration.
-        `out`: (n, C, N), receives Φ, samples on the last axis.
-        """
+        """Write Φ into `out`, (n, C, N), but for what is always zero: the caller's zeros; `q`, `qd`, `qdd`: (N, n)."""
         with _rows_used_in_place():
             for start in range(0, len(q), self._chunk):
                 part = slice(start, start + self._chunk)
@@ -112,9 +91,8 @@ class TorqueRegressor:
             _write_sum(column(motion, difference), out[:, at], scratch)
 
 
+# Add or subtract, a component of the joint screws (j, N), and its coefficient (N,).
 _Term = tuple[np.ufunc, Array, Array]
-"""Add or subtract, a component of the joint screws (j, N), and its coefficient (N,)."""
-
 _Column = Callable[[LinkMotion, Array], Sequence[_Term]]
 
 
@@ -165,13 +143,13 @@ def _first_moment(k: int) -> _Column:
     return terms
 
 
+# One entry a standard parameter, in the order of `STANDARD_PARAMETERS`.
 _COLUMNS: tuple[_Column, ...] = (
     *(_moment_of_inertia(k) for k in range(3)),
     *(_product_of_inertia(other) for other in (2, 1, 0)),
     _mass,
     *(_first_moment(k) for k in range(3)),
 )
-"""One entry a standard parameter, in the order of `STANDARD_PARAMETERS`."""
 
 
 def _write_sum(terms: Sequence[_Term], out: Array, scratch: Array) -> None:

@@ -37,10 +37,7 @@ class Screws(NamedTuple):
 
 
 class RegressorGradient:
-    """Gradients of functions of the torque regressor of one robot.
-
-    `columns`: (C,) int, the standard parameters that the regressor has columns for, ascending; all of them where None.
-    """
+    """Gradients of functions of one robot's torque regressor of some `columns`, (C,) int, or of all."""
 
     def __init__(self, robot: Robot, *, columns: Columns | None = None, capacity: int) -> None:
         links = robot.link_count
@@ -55,13 +52,9 @@ class RegressorGradient:
         self._parameters = [wanted[places] % _PER_LINK for places in self._places]
 
     def contract(self, q: Array, qd: Array, qdd: Array, weight: Array) -> tuple[Array, Array, Array]:
-        """Σ G ∂Φ/∂q, Σ G ∂Φ/∂q̇ and Σ G ∂Φ/∂q̈, each sample by itself.
+        """Σ G ∂Φ/∂q, Σ G ∂Φ/∂q̇, Σ G ∂Φ/∂q̈, (N, n) each, sample by sample; `q`, `qd`, `qdd`: (N, n).
 
-        `q`: (N, n), joint position [rad or m].
-        `qd`: (N, n), joint velocity.
-        `qdd`: (N, n), joint acceleration.
         `weight`: (n, C, N), G = ∂S/∂Φ, laid out as `TorqueRegressor.write` writes Φ.
-        Returns tuple of (N, n), ∂S/∂q, ∂S/∂q̇, ∂S/∂q̈.
         """
         state = [self._ratios @ array.T for array in (q, qd, qdd)]
         state[0] += self._offsets[:, None]

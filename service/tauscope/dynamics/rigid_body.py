@@ -8,18 +8,14 @@ from tauscope.dynamics.chain_motion import Array, ChainMotion
 from tauscope.dynamics.regressor import CHUNK
 from tauscope.robot.robot import STANDARD_PARAMETERS, LinkInertia, Robot
 
+# ε_ijk.
 _LEVI_CIVITA = np.array([[[(i - j) * (j - k) * (k - i) / 2.0 for k in range(3)] for j in range(3)] for i in range(3)])
-"""ε_ijk."""
 
 
 def inverse_dynamics(robot: Robot, parameters: Array, q: Array, qd: Array, qdd: Array) -> Array:
-    """Joint torque τ = H(q) q̈ + h(q, q̇) + c(q) = Φ(q, q̇, q̈) Θ, the seed paper's equations (1) and (2).
+    """Joint torque τ = H(q) q̈ + h(q, q̇) + c(q) = Φ(q, q̇, q̈) Θ, (N, n) [Nm or N], equations (1) and (2).
 
-    `parameters`: (10 m,), Θ, ten standard parameters of each of the m links in the order of `STANDARD_PARAMETERS`.
-    `q`: (N, n), joint position [rad or m].
-    `qd`: (N, n), joint velocity [rad/s or m/s].
-    `qdd`: (N, n), joint acceleration [rad/s² or m/s²].
-    Returns (N, n), joint torque or force, without friction [Nm or N].
+    `parameters`: (10 m,), Θ, ten of each link as `STANDARD_PARAMETERS`; `q`, `qd`, `qdd`: (N, n) [SI].
     """
     joints, maps = robot.joint_count, [_wrench_of_motion(link) for link in _links(parameters)]
     motion = ChainMotion(robot, min(CHUNK, max(len(q), 1)))
@@ -34,22 +30,15 @@ def inverse_dynamics(robot: Robot, parameters: Array, q: Array, qd: Array, qdd: 
 
 
 def gravity_torque(robot: Robot, parameters: Array, q: Array) -> Array:
-    """Torque c(q) that holds the arm against gravity, the last term of the seed paper's equation (1).
-
-    `parameters`: (10 m,), Θ, ten standard parameters a link; `q`: (N, n), joint position [rad or m]. Returns (N, n),
-    joint torque or force [Nm or N].
-    """
+    """Torque c(q) against gravity of (1), (N, n) [Nm or N]; `parameters`: (10 m,), Θ; `q`: (N, n) [rad or m]."""
     rest = np.zeros_like(q)
     return inverse_dynamics(robot, parameters, q, rest, rest)
 
 
 def mass_matrix(robot: Robot, parameters: Array, q: Array) -> Array:
-    """Joint-space inertia H(q) of the seed paper's equation (1): H = Σ_j J_jᵀ G_j J_j.
+    """Joint-space inertia H(q) = Σ_j J_jᵀ G_j J_j of (1), (N, n, n); J_j: joint screws of link j, G_j: its inertia.
 
-    J_j holds the joint screws of link j (`tauscope.dynamics.chain_motion`), G_j its inertia about its frame's origin.
-
-    `parameters`: (10 m,), Θ, ten standard parameters a link; `q`: (N, n), joint position [rad or m]. Returns (N, n, n),
-    symmetric, and positive definite where the links are physically possible [kg m², kg m, kg].
+    `parameters`: (10 m,), Θ; `q`: (N, n) [rad or m]. Positive definite where links are possible [kg m², kg m, kg].
     """
     joints = robot.joint_count
     inertias = [_spatial_inertia(link) for link in _links(parameters)]

@@ -46,10 +46,7 @@ class KinematicUsage:
         self._slopes = (1.0 / limits.half_range, 1.0 / limits.velocity, 1.0 / limits.acceleration)
 
     def signed(self, x: Array) -> tuple[Array, Array, Array]:
-        """Position, velocity and acceleration as parts of their limits, -1 to 1 within; (K, n) each.
-
-        `x`: (n, columns), centre and coefficients.
-        """
+        """Position, velocity and acceleration as parts of their limits, (K, n) each; `x`: (n, columns)."""
         motion = self._grid.motion(x)
         place = (motion.position - self._limits.middle) / self._limits.half_range
         # The bound holds for what swings about the centre; the centre itself is the same between samples.
@@ -61,17 +58,11 @@ class KinematicUsage:
         )
 
     def largest(self, x: Array) -> Array:
-        """Largest usage of position, velocity and acceleration at any instant, (3, n).
-
-        `x`: (n, columns), centre and coefficients.
-        """
+        """Largest usage of position, velocity and acceleration at any instant, (3, n); `x`: (n, columns)."""
         return np.stack([np.abs(part).max(axis=0) for part in self.signed(x)])
 
     def fitted(self, x: Array, fraction: float = 1.0) -> Array:
-        """The nearest series of the same shape within the limits: amplitudes taken back, then centres shifted.
-
-        `x`: (n, columns), centre and coefficients.
-        """
+        """The nearest series to `x`, (n, columns), within the limits: smaller amplitudes, then shifted centres."""
         place, velocity, acceleration = self.signed(x)
         swing = place - x[:, 0]
         needed = np.stack(
@@ -85,10 +76,7 @@ class KinematicUsage:
         return fitted
 
     def smooth(self, x: Array, scale: Array) -> SmoothMaximum:
-        """Smooth largest usages, position, velocity, acceleration of every joint.
-
-        `x`: (n, columns), centre and coefficients; `scale`: (3 n,), factors that make them exact at the present motion.
-        """
+        """Smooth largest usages of `x`, (n, columns), exact where `scale`, (3 n,), was taken."""
         joints = len(x)
         values = np.empty(3 * joints)
         jacobian = np.zeros((3 * joints, *x.shape))
@@ -119,10 +107,7 @@ class StateUsage:
         return [part for part in (self.torque, self.workspace) if part is not None]
 
     def usages(self, motion: MotionSamples, base: Array | None = None) -> list[Array]:
-        """Usage of each part, (N, n) of torque and (N, obstacles × points) of workspace.
-
-        `base`: (n, m, N), base regressor of the same motion, where the caller has it.
-        """
+        """Usage of each part, (N, n) of torque and (N, obstacles × points); `base`: (n, m, N), where it is known."""
         return [part.usage(motion, base) for part in self.parts]
 
     def largest(self, motion: MotionSamples) -> float:
@@ -138,20 +123,12 @@ class StateUsage:
         )
 
     def smooth_values(self, motion: MotionSamples, base: Array, scale: Array) -> Array:
-        """Smooth largest usages over all samples and joints, or points, (parts,).
-
-        `base`: (n, m, N), base regressor of the same motion; `scale`: (parts,), factors that make them exact at the
-        present motion.
-        """
+        """Smooth largest usages, (parts,), exact where `scale`, (parts,), was taken; `base`: (n, m, N)."""
         parts = self.usages(motion, base)
         return np.array([smooth_maximum(p.reshape(-1, 1), s)[0][0] for p, s in zip(parts, scale, strict=True)])
 
     def smooth_gradients(self, motion: MotionSamples, base: Array, scale: Array) -> list[MotionGradient]:
-        """Derivatives of `smooth_values` by the motion.
-
-        `base`: (n, m, N), base regressor of the same motion; `scale`: (parts,), factors that make them exact at the
-        present motion.
-        """
+        """Derivatives of `smooth_values` by the motion; `base`: (n, m, N), `scale`: (parts,)."""
         gradients = []
         for part, factor in zip(self.parts, scale, strict=True):
             usage = part.usage(motion, base)
@@ -161,11 +138,7 @@ class StateUsage:
 
 
 def smooth_maximum(usage: Array, scale: float | Array = 1.0) -> tuple[Array, Array]:
-    """The p-norm mean of usages over time and its derivatives.
-
-    `usage`: (N, C), not negative; `scale`: float or (C,), factors. Returns tuple of (C,) and (N, C), values, and
-    derivatives of value c by usage [:, c].
-    """
+    """The p-norm mean (C,) of `usage`, (N, C) ≥ 0, over time by `scale`, and its derivatives (N, C)."""
     top = np.maximum(usage.max(axis=0), 1e-12)
     powers = (usage / top) ** (POWER - 1.0)
     mean = np.maximum((powers * (usage / top)).mean(axis=0), 1e-300)

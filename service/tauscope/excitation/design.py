@@ -11,9 +11,10 @@ from tauscope.excitation.optimiser import OptimiserProgress, optimise
 from tauscope.excitation.setting import ExcitationOptions, Setting
 from tauscope.excitation.slow_reversals import SlowPart, slow_part
 from tauscope.robot import Robot
+from tauscope.strict_model import take_fields
 from tauscope.trajectory.document import ExcitationDocument, HistoryPart, trajectory_document
 from tauscope.trajectory.fourier_series import FourierSeries
-from tauscope.trajectory.segments import FourierSegment, Segment
+from tauscope.trajectory.segments import FourierSegment
 from tauscope.trajectory.trajectory import DesignRecord, Trajectory
 
 # Part of a limit: a limit that leaves no more than this above what is spared by wish is one that limits the design.
@@ -46,10 +47,7 @@ def design_excitation(
     *,
     progress: Callable[[OptimiserProgress], None] = lambda _: None,
 ) -> ExcitationDesign:
-    """The best excitation found within the limits: the seed paper's (20) and (21).
-
-    Raises ExcitationError where no motion keeps the limits, naming the constraint and the joint that block.
-    """
+    """The best excitation within the limits, (20) and (21). Raises ExcitationError, which names what blocks."""
     options = options or ExcitationOptions()
     setting = Setting.of(robot, options)
     rng = np.random.default_rng(options.seed)
@@ -57,13 +55,16 @@ def design_excitation(
     series = setting.space.series(result.x)
     slow = slow_part(robot, series, setting.planned, setting.states, options.slow_postures)
     value, condition_number = setting.value(series)
-    record = DesignRecord(options.criterion.value, value, condition_number, {}, options.seed)
-    segments = _segments(series, slow, options)
+    record = DesignRecord(
+        criterion=options.criterion.value, value=value, condition_number=condition_number, margins={}, seed=options.seed
+    )
+    closing = [FourierSegment(series, 1, first_period=options.periods)] if options.closing_period else []
+    segments = (FourierSegment(series, options.periods, first_period=0), *slow.segments, *closing)
     names = tuple(joint.name for joint in robot.joints)
     trajectory = Trajectory(robot.name, names, segments, setting.stated, record)
     margins = trajectory_margins(trajectory, setting.stated, setting.states, setting.available)
     return ExcitationDesign(
-        trajectory=replace(trajectory, design=replace(record, margins=margins.as_table())),
+        trajectory=replace(trajectory, design=record.model_copy(update={"margins": margins.as_table()})),
         series=series,
         periods=options.periods,
         criterion=options.criterion,
@@ -83,14 +84,6 @@ def design_excitation(
     )
 
 
-def _segments(series: FourierSeries, slow: SlowPart, options: ExcitationOptions) -> tuple[Segment, ...]:
-    """The repeated periods, slow reversals, and the first period again, numbered on."""
-    segments: list[Segment] = [FourierSegment(series, options.periods, first_period=0), *slow.segments]
-    if options.closing_period:
-        segments.append(FourierSegment(series, 1, first_period=options.periods))
-    return tuple(segments)
-
-
 def _active(robot: Robot, margins: Margins, options: ExcitationOptions) -> tuple[str, ...]:
     spared = 1.0 - options.limit_fraction
     kinds = {"position": spared, "velocity": spared, "acceleration": spared, "torque": 0.0}
@@ -98,11 +91,8 @@ def _active(robot: Robot, margins: Margins, options: ExcitationOptions) -> tuple
     found = []
     for kind, kept in kinds.items():
         left = table.get(kind, (None,) * robot.joint_count)
-        found += [
-            f"{kind} of {joint.name}"
-            for joint, value in zip(robot.joints, left, strict=True)
-            if value is not None and value <= kept + ACTIVE
-        ]
+        pairs = zip(robot.joints, left, strict=True)
+        found += [f"{kind} of {joint.name}" for joint, part in pairs if part is not None and part <= kept + ACTIVE]
     if margins.workspace_m is not None and margins.workspace_m <= ACTIVE_CLEARANCE_M:
         found.append("workspace")
     return tuple(found)
@@ -125,23 +115,16 @@ def _notes(robot: Robot, setting: Setting, slow: SlowPart) -> tuple[str, ...]:
 def excitation_document(design: ExcitationDesign) -> ExcitationDocument:
     """The document of a designed excitation."""
     trajectory = trajectory_document(design.trajectory)
-    return ExcitationDocument(
+    return take_fields(
+        ExcitationDocument,
+        design,
         robot=trajectory.robot,
         joints=trajectory.joints,
         criterion=design.criterion.value,
-        value=design.value,
-        condition_number=design.condition_number,
-        random_value=design.random_value,
         period_s=design.series.period_s,
         harmonics=design.series.harmonics,
-        periods=design.periods,
         duration_s=design.trajectory.duration_s,
-        margins={kind: list(values) for kind, values in design.margins.as_table().items()},
+        margins=design.margins.as_table(),
         clearance_m=design.margins.workspace_m,
-        active=list(design.active),
-        notes=list(design.notes),
-        evaluations=design.evaluations,
-        seconds=design.seconds,
-        history=list(design.history),
         trajectory=trajectory,
     )

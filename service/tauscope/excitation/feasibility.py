@@ -31,10 +31,7 @@ class Feasibility:
     states: StateUsage
 
     def standing_postures(self, rng: np.random.Generator) -> Array:
-        """Postures at which the arm may stand, (K, n), K ≥ 1 [rad or m].
-
-        Raises ExcitationError where there is none, naming the constraint and the joint that block.
-        """
+        """Where the arm may stand, (K, n), K ≥ 1 [rad or m]. Raises ExcitationError, which names what blocks."""
         unit = rng.uniform(-1.0, 1.0, (POSTURES, self.space.joint_count))
         unit[0] = 0.0
         postures = self.limits.middle + self.limits.half_range * unit
@@ -48,10 +45,7 @@ class Feasibility:
         return postures[possible]
 
     def random_start(self, postures: Array, rng: np.random.Generator) -> Array | None:
-        """A random series within all limits about one of the postures, (n, columns); None where none was found.
-
-        `postures`: (K, n), where the arm may stand.
-        """
+        """A random series within all limits about one of `postures`, (K, n); None where none was found."""
         n = self.space.joint_count
         at_rest = np.zeros((n, self.space.columns))
         at_rest[:, 0] = (postures[rng.integers(len(postures))] - self.limits.middle) / self.limits.half_range
@@ -73,18 +67,12 @@ class Feasibility:
         return found if np.abs(found[:, 1:]).max() > 1e-6 else None
 
     def repaired(self, x: Array, anchor: Array) -> Array:
-        """A feasible vector near x: limits of each joint first, then as far from the anchor as torque and space allow.
-
-        `x`: (n, columns), nearly feasible; `anchor`: (n, columns), feasible.
-        """
+        """A feasible vector near `x`: joint limits first, then towards `anchor`; both (n, columns)."""
         fitted = self.kinematics.fitted(x)
         return fitted if self.state_usage(fitted) <= SETTLED else self.towards(anchor, fitted)
 
     def towards(self, feasible: Array, wanted: Array) -> Array:
-        """The farthest feasible point found on the straight way from a feasible vector to a wanted one.
-
-        `feasible`: (n, columns), where torque and workspace are kept; `wanted`: (n, columns), where they are not.
-        """
+        """The farthest feasible point found from `feasible` straight to `wanted`; both (n, columns)."""
         low, high = 0.0, 1.0
         for _ in range(BISECTIONS):
             share = 0.5 * (low + high)
@@ -95,10 +83,7 @@ class Feasibility:
         return feasible + low * (wanted - feasible)
 
     def state_usage(self, x: Array) -> float:
-        """Largest usage of torque and workspace, between the instants of the grid too.
-
-        `x`: (n, columns), centre and coefficients.
-        """
+        """Largest usage of torque and workspace of `x`, (n, columns), between the grid's instants too."""
         largest = 0.0
         for part in self.states.usages(self.grid.motion(x)) if self.states.parts else ():
             # Between samples a smooth function exceeds them by an eighth of its second difference.
@@ -108,20 +93,17 @@ class Feasibility:
 
     def _refuse(self, postures: Array, parts: list[Array]) -> None:
         """Name the constraint that no posture keeps, or else those that no posture keeps together."""
-        place = 0
         torque, workspace = self.states.torque, self.states.workspace
         if torque is not None:
-            least = parts[place].min(axis=0)
+            least = parts[0].min(axis=0)
             if least.max() > SETTLED:
                 j = int(np.argmax(least))
-                joint = self.robot.joints[j]
+                joint, needed = self.robot.joints[j], least[j] * torque.available[j]
                 unit = joint.type.torque_unit
-                needed = least[j] * torque.available[j]
                 raise ExcitationError(
                     f"{joint.name}: torque limit: at rest the prior model needs {needed:.4g} {unit} or more in every "
                     f"posture, {torque.available[j]:.4g} {unit} may be used; check the limit, the model and the margin"
                 )
-            place += 1
         if workspace is not None:
             worst = workspace.clearance(postures).max(axis=0)
             blocked = int(np.argmin(worst))
@@ -130,15 +112,11 @@ class Feasibility:
                     f"workspace: {workspace.names[blocked]} meet in every posture, by {-worst[blocked]:.3g} m or more; "
                     "lower the floor or move the box"
                 )
-        raise ExcitationError(
-            f"none of {len(postures)} random postures keeps {self._names()} at once; relax one of them"
-        )
-
-    def _names(self) -> str:
         kinds = ["the position limits"]
-        kinds += ["the torque limits"] if self.states.torque is not None else []
-        kinds += ["the workspace"] if self.states.workspace is not None else []
-        return " and ".join([", ".join(kinds[:-1]), kinds[-1]] if len(kinds) > 1 else kinds)
+        kinds += ["the torque limits"] if torque is not None else []
+        kinds += ["the workspace"] if workspace is not None else []
+        names = " and ".join(filter(None, [", ".join(kinds[:-1]), kinds[-1]]))
+        raise ExcitationError(f"none of {len(postures)} random postures keeps {names} at once; relax one of them")
 
 
 def require_room(robot: Robot, limits: MotionLimits) -> None:

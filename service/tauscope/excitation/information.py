@@ -35,31 +35,18 @@ APART = 4.0  # k_v is never taken for less than this many δ: the two columns wo
 class ColumnScaling(StrEnum):
     """In which units the parameters are counted; condition numbers depend on it, ``log-det`` does not."""
 
-    NONE = "none"
-    """SI units, as the seed paper's (20), FIGAROH and `identify` count them."""
-    TYPICAL = "typical"
-    """Each column divided by its rms over random motions within the limits: units fall out."""
+    NONE = "none"  # SI units, as the seed paper's (20), FIGAROH and `identify` count them
+    TYPICAL = "typical"  # each column divided by its rms over random motions within the limits: units fall out
 
 
-@dataclass(frozen=True, eq=False)
-class MotionGradient:
-    """Derivatives of a scalar by a motion.
-
-    `position`, `velocity`, `acceleration`: (N, n), by q, q̇ and q̈ of every sample.
-    """
-
-    position: Array
-    velocity: Array
-    acceleration: Array
+MotionGradient = MotionSamples  # derivatives of a scalar by q, q̇ and q̈ of every sample, (N, n) each
 
 
 class ExcitationRegressor:
     """The regressor L of a motion, joint by joint, its information matrix and the way back from it.
 
-    `noise_std`: (n,), expected torque noise of each joint, by which its rows are divided [Nm or N]; equal weights where
-        None.
-    `steepest`: (n,), largest K_v that the samples resolve: a steeper sign function is taken so, for a gradient that
-        means something [s/rad or s/m]; None for the curve as it is.
+    `noise_std`: (n,), expected torque noise, by which rows are divided [Nm or N]; equal weights where None.
+    `steepest`: (n,), largest K_v of the samples, for gradients [s/rad or s/m]; None for the curve as it is.
     """
 
     def __init__(
@@ -94,10 +81,7 @@ class ExcitationRegressor:
         return out
 
     def rows(self, motion: MotionSamples, base: Array | None = None) -> list[Array]:
-        """L joint by joint: for each its columns that are not always zero, (C_j, N), weighted.
-
-        `base`: (n, m, N), `base_regressor` of the same motion, where the caller has it.
-        """
+        """L joint by joint: its columns that are not always zero, (C_j, N), weighted; `base`: (n, m, N)."""
         base = self.base_regressor(motion) if base is None else base
         rows = []
         for joint, slopes in enumerate(self._slopes):
@@ -128,10 +112,7 @@ class ExcitationRegressor:
         return matrix
 
     def pull_back(self, motion: MotionSamples, rows: list[Array], by_information: Array) -> MotionGradient:
-        """Derivatives by the motion of a scalar whose derivative by A is known.
-
-        `rows`: list of (C_j, N), from `rows`; `by_information`: (p, p), symmetric derivative by A.
-        """
+        """Derivatives of a scalar by the motion from those by A, `by_information`, (p, p), symmetric."""
         count = len(motion.position)
         weight = np.zeros((self.joint_count, len(self.base_columns), count))
         of_velocity = np.zeros_like(motion.velocity)
@@ -147,10 +128,7 @@ class ExcitationRegressor:
         return MotionGradient(gradient.position, gradient.velocity + of_velocity, gradient.acceleration)
 
     def pull_back_base(self, motion: MotionSamples, weight: Array) -> MotionGradient:
-        """Derivatives by the motion of a scalar whose derivatives by the base parameters' columns are known.
-
-        `weight`: (n, m, N), derivative by `base_regressor`.
-        """
+        """Derivatives of a scalar by the motion from those by `base_regressor`, `weight`, (n, m, N)."""
         parts = self._gradient.contract(motion.position, motion.velocity, motion.acceleration, weight)
         return MotionGradient(*parts)
 
@@ -170,12 +148,10 @@ SINGULAR = 1e-13
 class Criterion(StrEnum):
     """What the optimiser minimises."""
 
-    COND_F = "cond-f"
-    """Cond_F(LᵀL) = ‖LᵀL‖_F ‖(LᵀL)⁻¹‖_F, the seed paper's equation (20)."""
+    COND_F = "cond-f"  # cond_F(LᵀL) = ‖LᵀL‖_F ‖(LᵀL)⁻¹‖_F, the seed paper's equation (20)
+    # -ln det(LᵀL) / p: the volume of the parameters' confidence ellipsoid (D-optimal); no matter in which units.
     LOG_DET = "log-det"
-    """-ln det(LᵀL) / p: the volume of the parameters' confidence ellipsoid (D-optimal); no matter in which units."""
-    COND_2 = "cond-2"
-    """Condition number of L in the 2-norm, σ_max / σ_min."""
+    COND_2 = "cond-2"  # condition number of L in the 2-norm, σ_max / σ_min
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,10 +165,7 @@ class CriterionValue:
 
 
 def criterion_value(criterion: Criterion, information: Array, information_weight: float = 0.0) -> CriterionValue:
-    """A criterion, its gradient, and the condition number, from one eigenvalue decomposition.
-
-    `information`: (p, p), A = LᵀL, symmetric.
-    """
+    """A criterion of `information`, A = LᵀL, (p, p), its gradient, and the condition number."""
     values, vectors = np.linalg.eigh(information)
     low, high = float(values[0]), float(values[-1])
     if not low > SINGULAR * high:

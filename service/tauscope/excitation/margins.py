@@ -1,6 +1,5 @@
 """What a trajectory leaves of every limit, and the refusal of one that leaves nothing."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,36 +20,28 @@ ROUNDING = 1e-6  # part of a limit by which rounding may exceed it: a file's dig
 
 @dataclass(frozen=True, eq=False)
 class Margins:
-    """What is left of every limit, as part of the limit; negative where it is exceeded.
+    """What is left of every limit, as part of the limit; negative where it is exceeded."""
 
-    `position`, `velocity`, `acceleration`: (n,), of each joint's limits; position counts from the middle of the range.
-    `torque`: (n,), of the torque that may be used, by the prior model; infinite where there is no limit, None without a
-        model.
-    `workspace_m`: smallest clearance of joint origins and tool from floor and boxes [m]; None where nothing is
-        forbidden.
-    """
-
-    position: Array
-    velocity: Array
-    acceleration: Array
+    position: Array  # (n,), of the range, from its middle
+    velocity: Array  # (n,)
+    acceleration: Array  # (n,)
+    # (n,), of what may be used, by the prior model; infinite without a limit, None without a model
     torque: Array | None = None
+    # least clearance of joint origins and tool from floor and boxes [m]; None: nothing is forbidden
     workspace_m: float | None = None
 
-    def as_table(self) -> Mapping[str, tuple[float | None, ...]]:
+    def as_table(self) -> dict[str, list[float | None]]:
         """Margins of the joints by kind of limit, None where there is no limit."""
         kinds = {"position": self.position, "velocity": self.velocity, "acceleration": self.acceleration}
         if self.torque is not None:
             kinds["torque"] = self.torque
-        return {kind: tuple(float(v) if np.isfinite(v) else None for v in values) for kind, values in kinds.items()}
+        return {kind: [float(v) if np.isfinite(v) else None for v in values] for kind, values in kinds.items()}
 
 
 def trajectory_margins(
     trajectory: Trajectory, limits: MotionLimits, states: StateUsage | None, available: Array
 ) -> Margins:
-    """Margins over a whole trajectory; of Fourier series at every instant.
-
-    `available`: (n,), torque that may be used, infinite where there is no limit [Nm or N].
-    """
+    """Margins over a whole trajectory; `available`: (n,), torque, infinite without limit [Nm or N]."""
     usage = np.zeros((3, trajectory.joint_count))
     torque = np.zeros(trajectory.joint_count)
     clearance = np.inf
@@ -70,10 +61,7 @@ def trajectory_margins(
 
 
 def require_within_limits(trajectory: Trajectory, robot: Robot, limits: MotionLimits, name: str = "trajectory") -> None:
-    """Refuse a trajectory that leaves the limits of position, velocity or acceleration at any instant.
-
-    Raises ExcitationError naming joint, instant, value and limit.
-    """
+    """Raise ExcitationError, which names joint, instant, value and limit, where a trajectory leaves a limit."""
     margins = trajectory_margins(trajectory, limits, None, limits.torque)
     for kind in ("position", "velocity", "acceleration"):
         left = getattr(margins, kind)

@@ -55,10 +55,7 @@ class OptimiserResult:
 
 @dataclass(frozen=True, eq=False)
 class Stages:
-    """The same question at two resolutions, and its answer without any smoothing.
-
-    `exact`: the criterion of a vector (n, columns) with friction's curve as it is: what candidates are compared by.
-    """
+    """The same question at two resolutions; `exact` compares candidates, with friction's curve as it is."""
 
     coarse: ExcitationProblem
     fine: ExcitationProblem
@@ -129,10 +126,7 @@ def optimise(
     starts: int = STARTS,
     progress: Callable[[OptimiserProgress], None] = lambda _: None,
 ) -> OptimiserResult:
-    """The best feasible vector of several starts.
-
-    Raises ExcitationError where no motion is feasible, or none excites all parameters.
-    """
+    """The best feasible vector of several starts. Raises ExcitationError where none excites all parameters."""
     begin = time.perf_counter()
     search = _Search(stages, feasibility, progress, starts * SHORT_ROUND + ROUNDS * LONG_ROUND)
     # The matrices have some fifty columns: more threads would only wait for one another.

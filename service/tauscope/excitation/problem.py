@@ -89,10 +89,7 @@ class ExcitationProblem:
         return -np.concatenate([kinematic, *states]).reshape(-1, len(vector))
 
     def calibrate(self, vector: Array) -> None:
-        """Make the smooth largest usages exact at a vector; from there on they are another problem's.
-
-        `vector`: (size,), the present motion.
-        """
+        """Make the smooth largest usages exact at `vector`, (size,): from there on another problem's."""
         at = self._at(vector)
         smooth = self._kinematics.smooth(at.x, np.ones_like(self._kinematic_scale)).values
         self._kinematic_scale = self._kinematics.largest(at.x).ravel() / np.maximum(smooth, 1e-12)

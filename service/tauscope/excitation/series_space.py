@@ -15,14 +15,10 @@ from tauscope.trajectory.limits import MotionLimits
 
 
 class SeriesSpace:
-    """Series of one period and number of harmonics as vectors x, one row a joint.
+    """Series of one period and harmonics as vectors x. Raises ExcitationError for too few harmonics.
 
     Row j is (centre, coefficients): the centre as part of half the position range away from its middle, the
-    coefficients as parts of the speed limit. All entries are of order one.
-
-    `period_s`: fundamental period [s].
-
-    Raises ExcitationError for too few harmonics.
+    coefficients as parts of the speed limit. All entries are of order one. `period_s`: fundamental period [s].
     """
 
     def __init__(self, limits: MotionLimits, period_s: float, harmonics: int) -> None:
@@ -77,10 +73,7 @@ class SeriesSpace:
 
 
 class SeriesGrid:
-    """Motion at fixed instants as a linear function of the vector x, and the way back.
-
-    `bases`: three (K, 2 (M - 1)), position, velocity and acceleration per coefficient.
-    """
+    """Motion at fixed instants by the vector x; `bases`: (K, 2 (M - 1)) of q, q̇ and q̈ by coefficient."""
 
     def __init__(self, limits: MotionLimits, bases: tuple[Array, Array, Array]) -> None:
         self._limits = limits

@@ -29,11 +29,7 @@ from tauscope.trajectory.limits import MotionLimits, motion_limits
 
 @dataclass(frozen=True, eq=False)
 class ExcitationOptions:
-    """What is wished of an excitation.
-
-    `noise_std`: (n,), expected torque noise of each joint, which weights its equations [Nm or N]; equal weights where
-        None.
-    """
+    """What is wished of an excitation; `noise_std`: (n,), of torque, weights of joints, equal where None."""
 
     period_s: float = 10.0  # duration of one period [s]
     harmonics: int = 5

@@ -13,13 +13,9 @@ SMALL_TORQUE = 1e-2  # part of the torque limit below which |τ| is rounded off,
 
 
 class TorquePrediction:
-    """Largest torque that each joint will need: |rigid-body torque| + friction, whichever way friction acts.
+    """Upper bound of |τ|: rigid-body torque and the larger of stiction and Coulomb level, whichever way friction acts.
 
-    Friction counts with the larger of stiction and Coulomb level whatever the direction: near a reversal it acts
-    either way, and the sum is an upper bound of |τ|.
-
-    `velocity`: (n,), speed limits [rad/s or m/s].
-    `available`: (n,), torque that may be used, infinite where there is no limit [Nm or N].
+    `velocity`: (n,), speed limits [rad/s or m/s]; `available`: (n,), torque, infinite where unlimited [Nm or N].
     """
 
     def __init__(
@@ -43,26 +39,16 @@ class TorquePrediction:
         return TorquePrediction(self._robot, self._base_parameters, regressor, self._velocity, self.available)
 
     def torque(self, motion: MotionSamples, base: Array | None = None) -> Array:
-        """Bound of |τ| at every sample, (N, n) [Nm or N].
-
-        `base`: (n, m, N), `ExcitationRegressor.base_regressor` of the same motion, where the caller has it.
-        """
+        """Bound of |τ| at every sample, (N, n) [Nm or N]; `base`: (n, m, N), where the caller has it."""
         base = self._regressor.base_regressor(motion) if base is None else base
         return self._round_off(self._rigid(base), self._small) + self._friction(motion)
 
     def usage(self, motion: MotionSamples, base: Array | None = None) -> Array:
-        """Part of the available torque that is used at every sample, (N, n); zero where there is no limit.
-
-        `base`: (n, m, N), `ExcitationRegressor.base_regressor` of the same motion, where the caller has it.
-        """
+        """Part of the available torque that is used, (N, n), zero without limit; `base`: (n, m, N)."""
         return self.torque(motion, base) / self.available
 
     def pull_back(self, motion: MotionSamples, base: Array, weight: Array) -> MotionGradient:
-        """Derivatives by the motion of Σ weight · usage.
-
-        `base`: (n, m, N), `ExcitationRegressor.base_regressor` of the same motion; `weight`: (N, n), derivative by
-        `usage`.
-        """
+        """Derivatives by the motion of Σ weight · usage; `weight`: (N, n), `base`: (n, m, N)."""
         rigid = self._rigid(base)
         by_torque = weight / self.available
         by_rigid = by_torque * rigid / self._round_off(rigid, self._small)

@@ -89,12 +89,7 @@ class WorkspaceUsage:
         return tuple(f"{point.name} and {obstacle}" for obstacle in obstacles for point in self._points)
 
     def clearance(self, position: Array) -> Array:
-        """Distance of every point from every obstacle, negative within; (N, obstacles × points) [m].
-
-        Outside a box it is the largest distance along an axis, which is never more than the distance itself.
-
-        `position`: (N, n), postures [rad or m].
-        """
+        """Distance of points from obstacles, negative within, (N, obstacles × points) [m], by `position`, (N, n)."""
         points = self._places(self._frames(position))
         columns = [] if self._workspace.floor_m is None else [points[..., 2] - self._workspace.floor_m]
         for box in self._workspace.boxes:
@@ -106,10 +101,7 @@ class WorkspaceUsage:
         return np.maximum(1.0 - self.clearance(motion.position) / REFERENCE_M, 0.0)
 
     def pull_back(self, motion: MotionSamples, _base: Array, weight: Array) -> MotionGradient:
-        """Derivatives by the motion of Σ weight · usage.
-
-        `_base`: (n, m, N), not needed; `weight`: (N, obstacles × points), derivative by `usage`.
-        """
+        """Derivatives of Σ `weight` (N, obstacles × points) · usage; `_base` (n, m, N) is not needed."""
         chain = self._frames(motion.position)
         points = self._places(chain)
         force = np.zeros_like(points)

@@ -42,13 +42,7 @@ class ActuatorChoice:
 def actuator_elements(
     robot: Robot, links: Sequence[LinkInertia], rotors: Sequence[float], names: Sequence[str], choice: ActuatorChoice
 ) -> tuple[list[str], list[str]]:
-    """Actuator elements, one a joint, and notes on gains that are chosen rather than known.
-
-    Raises ExportError if the number of gains is not one, nor that of the joints.
-
-    `names`: names of the joints as quoted attribute values; `rotors`: reflected rotor inertias, one a joint [kg m² or
-    kg].
-    """
+    """Elements, one a joint, and notes on gains chosen; `names`: quoted; `rotors` [kg m² or kg]. Raises ExportError."""
     if choice.kind is ActuatorKind.MOTOR:
         return [_motor(joint, name) for joint, name in zip(robot.joints, names, strict=True)], []
     gains, notes = joint_gains(robot, links, rotors, choice)
@@ -65,12 +59,7 @@ def actuator_elements(
 def joint_gains(
     robot: Robot, links: Sequence[LinkInertia], rotors: Sequence[float], choice: ActuatorChoice
 ) -> tuple[list[tuple[float, float]], list[str]]:
-    """Gains kp and kv of each joint: as given, as in the user's MJCF, or for a bandwidth; and notes on the last.
-
-    Raises ExportError if the number of gains is not one, nor that of the joints.
-
-    `rotors`: reflected rotor inertias, one a joint [kg m² or kg].
-    """
+    """Gains kp and kv as given, as in the user's MJCF, or for a bandwidth, and notes. Raises ExportError."""
     count, notes = robot.joint_count, []
     for option, values in (("kp", choice.kp), ("kv", choice.kv)):
         if len(values) not in (0, 1, count):
@@ -124,10 +113,7 @@ def _dc_motor(joint: Joint, name: str, kp: float, kv: float) -> str:
 
 
 def to_isaac_lab(model: ExportModel, choice: ActuatorChoice) -> str:
-    """Python source with ``NAME_ACTUATORS``, for ``ArticulationCfg(actuators=…)``.
-
-    Raises ExportError if a coefficient is not finite, or the number of gains is not one, nor that of the joints.
-    """
+    """Python source with ``NAME_ACTUATORS``, for ``ArticulationCfg(actuators=…)``. Raises ExportError."""
     rotors = [value or 0.0 for value in model.rotor_inertia]
     gains, notes = joint_gains(model.robot, model.links, rotors, choice)
     names = [re.escape(joint.name) for joint in model.robot.joints]

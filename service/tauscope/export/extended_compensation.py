@@ -9,8 +9,8 @@ from datetime import datetime
 
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.errors import ExportError
-from tauscope.export.compensation import RecordingSource, to_c_header, to_python
-from tauscope.export.compensation.source_code import identifier
+from tauscope.export.compensation.model import RecordingSource
+from tauscope.export.compensation.source_code import identifier, to_c_header, to_python
 from tauscope.export.model import ExportModel, FoundEffect, Origin, of_extended_model
 from tauscope.recording import EffortKind
 
@@ -24,10 +24,7 @@ def compensation_code(
     version: str,
     effort_kind: EffortKind,
 ) -> str:
-    """Source code that gives the torque of friction and of the found effects.
-
-    Raises ExportError for another suffix, or coefficients that no controller can use.
-    """
+    """Source code of the torque of friction and found effects. Raises ExportError for another suffix."""
     origin = Origin(tuple(sources), effort_kind, created, version=version)
     return source_code(of_extended_model(diagnosis.selection.fit.model, (), origin), suffix)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from tauscope.errors import ExportError
 from tauscope.export.actuators import ActuatorChoice
-from tauscope.export.compensation import to_json, to_yaml
+from tauscope.export.compensation.model import to_json, to_yaml
 from tauscope.export.extended_compensation import source_code
 from tauscope.export.mjcf import to_mjcf
 from tauscope.export.mjcf_findings import effects_in
@@ -69,22 +69,14 @@ SUFFIXES = {
 
 
 def make_export(export_format: ExportFormat, model: ExportModel, choice: ActuatorChoice | None = None) -> bytes:
-    """The content of an export.
-
-    Controllers get the delivered friction; simulators the physically consistent links with the friction that fits them.
-    Raises ExportError if the format cannot hold this model.
-
-    `choice`: actuators of an MJCF; None writes torque motors.
-    """
+    """An export's content: for controllers delivered friction, for simulators consistent links. Raises ExportError."""
     match export_format:
         case ExportFormat.JSON:
             return to_json(model.compensation, effect_entries(model)).encode()
         case ExportFormat.YAML:
             return to_yaml(model.compensation, effect_entries(model)).encode()
-        case ExportFormat.C:
-            return source_code(model, ".h").encode()
-        case ExportFormat.PYTHON:
-            return source_code(model, ".py").encode()
+        case ExportFormat.C | ExportFormat.PYTHON:
+            return source_code(model, ".h" if export_format is ExportFormat.C else ".py").encode()
         case ExportFormat.URDF:
             if model.origin.urdf is None:
                 text = "its chain does not come from a URDF; export an MJCF (.xml) instead"

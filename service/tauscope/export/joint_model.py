@@ -51,10 +51,7 @@ def joint_models(
     friction: Sequence[JointFriction],
     rotor_inertia: Sequence[float | None] | None = None,
 ) -> dict[str, JointModel]:
-    """The whole robot's model by the labels of its segments, as the exports take it.
-
-    `links`: one a segment; `friction`: one a joint; `rotor_inertia`: identified rotor inertias [kg m² or kg].
-    """
+    """Models by the labels of segments; `links` by segment, `friction` by joint."""
     rotors = [None] * robot.joint_count if rotor_inertia is None else rotor_inertia
     own = {link: joint for joint, link in enumerate(robot.own_links)}
     made: dict[str, JointModel] = {}
@@ -67,10 +64,7 @@ def joint_models(
 
 
 def centred(joint: str, link: LinkInertia) -> CentredInertia:
-    """Centre of mass and inertia about it: I_c = I - m (sᵀs 1 - s sᵀ), equation (5) reversed.
-
-    Raises ExportError if no rigid body has these parameters.
-    """
+    """Centre of mass and I_c = I - m (sᵀs 1 - s sᵀ), (5) reversed. Raises ExportError for no rigid body."""
     finite = bool(np.isfinite(link.to_vector()).all())
     defect = find_defect(link) if finite and link.mass > 0.0 else f"mass {link.mass:g} kg"
     if defect is not None:
@@ -82,12 +76,7 @@ def centred(joint: str, link: LinkInertia) -> CentredInertia:
 
 
 def dry_friction_and_damping(joint: str, friction: JointFriction) -> tuple[float, float]:
-    """The two numbers that simulators hold: τ_s + τ_sc and τ_v, neither below zero.
-
-    Raises ExportError if a coefficient is not finite.
-
-    Returns tuple of two float: dry friction [Nm or N], damping [Nm s/rad or N s/m].
-    """
+    """τ_s + τ_sc and τ_v, neither below zero, as simulators hold them. Raises ExportError if not finite."""
     check_friction(joint, friction)
     return max(0.0, friction.stiction + friction.stribeck), max(0.0, friction.viscous)
 
@@ -115,10 +104,7 @@ def friction_notes(joint: str, friction: JointFriction, format_name: str) -> lis
 
 
 def without_branch(name: str, model: JointModel) -> tuple[LinkInertia, list[str]]:
-    """A joint's own link, without the bodies that the file has elsewhere; and notes.
-
-    Raises ExportError if these bodies weigh more than the link.
-    """
+    """A link without the bodies that the file has elsewhere; and notes. Raises ExportError if they weigh more."""
     link = model.link or LinkInertia.from_vector(np.zeros(10))
     if model.branch is None or not np.any(model.branch.to_vector()):
         return link, []

@@ -7,7 +7,7 @@ import numpy as np
 from tauscope.errors import ExportError
 from tauscope.export.actuators import ActuatorChoice, actuator_elements
 from tauscope.export.compensation.source_code import comment_text
-from tauscope.export.joint_model import JointModel, centred, numbers
+from tauscope.export.joint_model import centred, numbers
 from tauscope.export.mjcf_findings import NEWER, Additions, JointExtras, MjcfSegment, add_findings
 from tauscope.export.model import ExportModel
 from tauscope.robot import JointType, Robot, Segment
@@ -76,10 +76,7 @@ def to_mjcf(model: ExportModel, choice: ActuatorChoice = MOTORS) -> MjcfModel:
 
 
 def passive_elements(joint: int, extras: JointExtras, names: list[str]) -> list[str]:
-    """Passive torques of a joint, which have no control input and whose motor is switched off.
-
-    `names`: of the joints, as quoted attribute values.
-    """
+    """Passive torques of a joint, by its quoted name; no control input, and its motor is switched off."""
     return [
         f'<dcmotor joint={names[joint]} resistance="1.0" motorconst="0.0 0.0" input="none" {each}/>'
         for each in extras.passive
@@ -137,17 +134,15 @@ def _joint(motion: Segment, segment: MjcfSegment) -> str:
         attributes["range"] = numbers(*segment.joint.limits.position)
     if model.friction is not None:
         attributes |= extras.friction_attributes(segment.label, model.friction)
-    attributes["armature"] = numbers(_armature(segment.label, model))
+    armature = model.rotor_inertia or 0.0
+    if not 0.0 <= armature < np.inf:
+        text = (
+            f"joint {shown(segment.label)}: rotor inertia {armature:g} must be 0 or more; export the consistent model"
+        )
+        raise ExportError(text)
+    attributes["armature"] = numbers(armature)
     written = " ".join(f'{key}="{value}"' for key, value in (attributes | extras.attributes).items())
     return f"<joint name={_quote(segment.label)} {written}/>"
-
-
-def _armature(label: str, model: JointModel) -> float:
-    armature = 0.0 if model.rotor_inertia is None else float(model.rotor_inertia)
-    if not (np.isfinite(armature) and armature >= 0.0):
-        text = f"joint {shown(label)}: rotor inertia {armature:g} must be 0 or more; export the consistent model"
-        raise ExportError(text)
-    return armature
 
 
 def _quote(name: str) -> str:

@@ -79,10 +79,7 @@ class Additions:
 
 
 def add_findings(model: ExportModel, *, without: Collection[str] = ()) -> Additions:
-    """Everything that MuJoCo can hold of a model's findings, and a note on each of the others.
-
-    `without`: ids of effects that are left out, since they change more than joints and bodies.
-    """
+    """What MuJoCo can hold of a model's findings, but effects of ids `without`; and a note on each of the others."""
     extras = [JointExtras() for _ in model.robot.joints]
     added = Additions(model.robot, list(model.links), model.friction, extras)
     names = [joint.name for joint in model.robot.joints]

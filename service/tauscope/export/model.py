@@ -12,7 +12,7 @@ from tauscope.diagnosis.extended_model import consistent_links
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.torque_scale import on_the_arm
 from tauscope.effects import Effect
-from tauscope.export.compensation import (
+from tauscope.export.compensation.model import (
     CompensationModel,
     JointCompensation,
     JointFriction,
@@ -58,11 +58,7 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class ExportModel:
-    """Bodies that can exist, friction for simulators and for controllers, and findings.
-
-    `links`: one a segment.
-    `friction`, `delivered_friction`: one a joint: beside these bodies, and as delivered.
-    """
+    """Bodies that can exist, one a segment, friction beside them and as delivered, one a joint, and findings."""
 
     robot: Robot
     links: tuple[LinkInertia, ...]
@@ -79,10 +75,7 @@ class ExportModel:
 
     @property
     def compensation(self) -> CompensationModel:
-        """Friction as delivered, for controllers.
-
-        Raises ExportError if a coefficient is not usable, or the drive's units contradict each other.
-        """
+        """Friction as delivered, for controllers. Raises ExportError for coefficients or units without meaning."""
         joints = tuple(
             JointCompensation(joint.name, joint.type, friction, drive_units(joint, self.origin.effort_kind))
             for joint, friction in zip(self.robot.joints, self.delivered_friction, strict=True)
@@ -97,15 +90,9 @@ def of_identification(identification: Identification, origin: Origin) -> ExportM
     rotors: list[float | None] = [None] * robot.joint_count
     for joint, column in structure.coefficients("rotor_inertia").items():
         rotors[joint] = float(parameters[column])
-    return ExportModel(
-        robot=robot,
-        links=tuple(identification.consistent.links),
-        friction=_frictions(structure, parameters, identification.shapes),
-        delivered_friction=_frictions(structure, identification.parameters, identification.shapes),
-        rotor_inertia=tuple(rotors),
-        effects=(),
-        origin=origin,
-    )
+    delivered = _frictions(structure, identification.parameters, identification.shapes)
+    friction, links = _frictions(structure, parameters, identification.shapes), tuple(identification.consistent.links)
+    return ExportModel(robot, links, friction, delivered, tuple(rotors), (), origin)
 
 
 def of_diagnosis(diagnosis: Diagnosis, origin: Origin) -> ExportModel:
@@ -122,15 +109,7 @@ def of_extended_model(model: ExtendedModel, links: Sequence[LinkInertia], origin
     for each in found:
         if each.effect.id == "rotor_inertia" and each.effect.joint is not None:
             rotors[each.effect.joint] = max(0.0, float(each.coefficients[0]))
-    return ExportModel(
-        robot=robot,
-        links=tuple(links),
-        friction=friction,
-        delivered_friction=friction,
-        rotor_inertia=tuple(rotors),
-        effects=found,
-        origin=origin,
-    )
+    return ExportModel(robot, tuple(links), friction, friction, tuple(rotors), found, origin)
 
 
 def _frictions(

@@ -19,7 +19,7 @@ from tauscope.diagnosis.extended_model import (
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.effects.rotor_inertia import RotorInertia
 from tauscope.errors import ExportError, IdentificationError, RobotFileError
-from tauscope.export.compensation import RecordingSource
+from tauscope.export.compensation.model import RecordingSource
 from tauscope.export.model import ExportModel, Origin, of_extended_model
 from tauscope.identification import Identification
 from tauscope.recording import EffortKind
@@ -111,10 +111,7 @@ def read_model_file(path: Path) -> ModelFile:
 
 
 def read_extended_model(path: Path, robot: Robot) -> ExtendedModel:
-    """The extended model of a file, for an arm that is at hand.
-
-    Raises IdentificationError naming the file and the key, or where it belongs to another arm.
-    """
+    """A file's extended model of the arm at hand. Raises IdentificationError, which names file and key."""
     try:
         return restore_model(read_model_file(path), robot)
     except IdentificationError as error:
@@ -123,18 +120,12 @@ def read_extended_model(path: Path, robot: Robot) -> ExtendedModel:
 
 
 def read_export_model(path: Path) -> ExportModel:
-    """The model of a file as exports need it, findings included.
-
-    Raises ExportError where the file has no arm. Raises IdentificationError naming the file and the key.
-    """
+    """A file's model with its findings. Raises ExportError without an arm, IdentificationError with its key."""
     return read_export_models(path)[-1]
 
 
 def read_export_models(path: Path) -> tuple[ExportModel, ...]:
-    """The models of a file as exports need them: without findings where the file has that, and with them.
-
-    Raises ExportError where the file has no arm. Raises IdentificationError naming the file and the key.
-    """
+    """A file's model without findings, where it has that, and with them; raises as `read_export_model`."""
     document = read_model_file(path)
     arm = document.arm
     if arm is None:

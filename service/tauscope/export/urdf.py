@@ -5,17 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tauscope.errors import ExportError
+from tauscope.export import joint_model
 from tauscope.export.compensation.model import JointFriction
 from tauscope.export.compensation.source_code import comment_text
-from tauscope.export.joint_model import (
-    CentredInertia,
-    JointModel,
-    centred,
-    dry_friction_and_damping,
-    friction_notes,
-    numbers,
-    without_branch,
-)
 from tauscope.export.xml_spans import Element, XmlText
 from tauscope.robot.messages import nearest, shown
 
@@ -31,17 +23,16 @@ class PatchedUrdf:
     notes: tuple[str, ...]
 
 
-def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel], remarks: Sequence[str] = ()) -> PatchedUrdf:
+def patch_urdf(
+    source: bytes | Path, models: Mapping[str, joint_model.JointModel], remarks: Sequence[str] = ()
+) -> PatchedUrdf:
     """Write links and friction into a URDF in place; comments, meshes, order and white space stay byte for byte.
 
-    A link's ``<inertial>`` gets the centre of mass, rpy 0, and the inertia about the centre of mass along the link
-    frame's axes. ``<dynamics>`` gets damping = τ_v and friction = τ_s + τ_sc, the Coulomb level at speed. Links on
-    fixed joints below are part of the identified link: their own inertials are set to zero, not removed, because
-    simulators make up a mass from the shapes of a link that has none. Bodies on joints beside the chain stay, and
-    their mass is taken off the link that carries them. Raises ExportError if the file is not a URDF, a joint is not in
-    it or does not move, or a link cannot exist.
-
-    `remarks`: further lines of the comment.
+    An ``<inertial>`` gets the centre of mass, rpy 0, and the inertia about it along the link frame's axes, a joint's
+    ``<dynamics>`` damping = τ_v and friction = τ_s + τ_sc. Links on fixed joints below are part of the identified link:
+    their inertials become zero, for simulators make up a mass for a shape without one. Bodies on joints beside the
+    chain stay, their mass is taken off the link that carries them. `remarks`: further lines of the comment. Raises
+    ExportError if it is no URDF, a joint is not in it or does not move, or a link cannot exist.
     """
     data, label = _read(source)
     text = XmlText(data, label)
@@ -52,9 +43,9 @@ def patch_urdf(source: bytes | Path, models: Mapping[str, JointModel], remarks: 
     for name, model in models.items():
         joint = tree.moving_joint(name)
         if model.link is not None:
-            own, moved = without_branch(name, model)
+            own, moved = joint_model.without_branch(name, model)
             notes += moved
-            _write_inertial(text, tree.link(joint.child), centred(name, own))
+            _write_inertial(text, tree.link(joint.child), joint_model.centred(name, own))
             notes += _zero_fixed_children(text, tree, joint.child, frozenset(models))
         if model.friction is not None:
             notes += _write_dynamics(text, joint.element, name, model.friction)
@@ -119,11 +110,11 @@ def _joint(element: Element) -> _Joint:
     return _Joint(element, element.attributes.get("type", ""), ends[0], ends[1])
 
 
-def _write_inertial(text: XmlText, link: Element, inertia: CentredInertia) -> None:
+def _write_inertial(text: XmlText, link: Element, inertia: joint_model.CentredInertia) -> None:
     values = {
-        "origin": {"xyz": numbers(*inertia.centre), "rpy": "0 0 0"},
-        "mass": {"value": numbers(inertia.mass)},
-        "inertia": {key: numbers(inertia.inertia[row, column]) for key, row, column in _INERTIA},
+        "origin": {"xyz": joint_model.numbers(*inertia.centre), "rpy": "0 0 0"},
+        "mass": {"value": joint_model.numbers(inertia.mass)},
+        "inertia": {key: joint_model.numbers(inertia.inertia[row, column]) for key, row, column in _INERTIA},
     }
     tags = {kind: _tag(f"{link.prefix}{kind}", attributes) for kind, attributes in values.items()}
     inertials = list(link.named("inertial"))
@@ -181,14 +172,14 @@ def _zero_inertial(text: XmlText, element: Element, name: str, joint: str, carri
 
 
 def _write_dynamics(text: XmlText, element: Element, name: str, friction: JointFriction) -> list[str]:
-    dry, damping = dry_friction_and_damping(name, friction)
-    values = {"damping": numbers(damping), "friction": numbers(dry)}
+    dry, damping = joint_model.dry_friction_and_damping(name, friction)
+    values = {"damping": joint_model.numbers(damping), "friction": joint_model.numbers(dry)}
     existing = list(element.named("dynamics"))
     for dynamics in existing:
         text.set_attributes(dynamics, values)
     if not existing:
         text.append_child(element, [_tag(f"{element.prefix}dynamics", values)])
-    return friction_notes(name, friction, "URDF")
+    return joint_model.friction_notes(name, friction, "URDF")
 
 
 def _tag(name: str, attributes: Mapping[str, str]) -> str:

@@ -13,10 +13,7 @@ _TAG_END = re.compile(rb"""(?:[^>"']|"[^"]*"|'[^']*')*>""")
 
 @dataclass(eq=False)
 class Element:
-    """An element and where it stands in the file, in bytes.
-
-    `comments`: list of (int, int), spans of the comments directly inside.
-    """
+    """An element and where it stands in the file, in bytes."""
 
     name: str
     attributes: Mapping[str, str]
@@ -25,7 +22,7 @@ class Element:
     close_start: int = -1
     end: int = -1
     children: list["Element"] = field(default_factory=list)
-    comments: list[tuple[int, int]] = field(default_factory=list)
+    comments: list[tuple[int, int]] = field(default_factory=list)  # spans of those directly inside
 
     @property
     def prefix(self) -> str:
@@ -47,10 +44,7 @@ class Edit:
 
 
 class XmlText:
-    """The bytes of an XML file, its elements, and the edits that are to be made.
-
-    Raises ExportError if the file is not well-formed XML in UTF-8, or declares a DOCTYPE.
-    """
+    """The bytes of an XML file, and edits to be made. Raises ExportError unless it is sound UTF-8 without DOCTYPE."""
 
     def __init__(self, data: bytes, label: str) -> None:
         self.data = data

@@ -13,6 +13,7 @@ from tauscope.headroom.floor import NoiseFloor, noise_floors
 from tauscope.headroom.joint_headroom import JointHeadroom, joint_headroom
 from tauscope.headroom.motion_rows import MotionRows
 from tauscope.recording.recording import Array
+from tauscope.strict_model import take_fields
 
 
 def motion_rows(diagnosis: Diagnosis) -> tuple[list[MotionRows], list[MotionRows]]:
@@ -71,18 +72,12 @@ def _progress(observations: Observations, piece: Piece, time: Array, end_s: floa
     return progress
 
 
+# Part of a joint's held-out residual energy beyond which what a black box predicts is something (issue: 5 %).
 REFUTES_FROM = 0.05
-"""Part of a joint's held-out residual energy beyond which what a black box predicts is something (issue: 5 %)."""
 
 
 def require_black_box(held_out: int) -> None:
-    """Check that headroom can be measured, before anything else is.
-
-    Raises MissingExtraError where scikit-learn is not installed. Raises IdentificationError where no recording is held
-    out.
-
-    `held_out`: number of held-out recordings.
-    """
+    """Raise MissingExtraError without scikit-learn, and IdentificationError without a held-out recording."""
     with require_extra("tauscope diagnose --headroom"):
         import sklearn  # noqa: F401
     if not held_out:
@@ -90,11 +85,7 @@ def require_black_box(held_out: int) -> None:
 
 
 def measure_headroom(diagnosis: Diagnosis) -> list[HeadroomEntry]:
-    """What a black box of the same training motion predicts of held-out motion, joint by joint.
-
-    Raises MissingExtraError where scikit-learn is not installed. Raises IdentificationError where no recording is held
-    out.
-    """
+    """What a black box of the same motion predicts of held-out motion, joint by joint; raises as above."""
     training, held_out = motion_rows(diagnosis)
     require_black_box(len(held_out))
     # One after another: scikit-learn's own use of warnings.catch_warnings allows no two threads.
@@ -117,10 +108,10 @@ def headroom_entry(joint: str, found: JointHeadroom, floor: NoiseFloor, *, is_op
         statement = f"A black box still predicts {share}; the verdict leaves it open."
     else:
         statement = f"A black box still predicts {share}: something is left."
-    return HeadroomEntry(
+    return take_fields(
+        HeadroomEntry,
+        found,
         joint=joint,
-        plain=found.plain,
-        explained=found.explained,
         black_box=_number(found.black_box),
         floor=floor.rms,
         floor_kind=floor.kind,

@@ -26,11 +26,8 @@ SAME = 0.02
 """Rms difference of every joint's positions, relative to their spread, up to which two motions are the same: what a
 model leaves changes by no more than that part of itself."""
 
-LEAST_OVERLAP = 0.5
-"""Part of the shorter recording that must be the same."""
-
-FEWEST_SHARED = 100
-"""Rows that two recordings must share: the rms of their difference is then known to 10 %."""
+LEAST_OVERLAP = 0.5  # part of the shorter recording that must be the same
+FEWEST_SHARED = 100  # rows that two recordings must share: the rms of their difference is then known to 10 %
 
 
 def noise_between(motions: Sequence[MotionRows]) -> Array:
@@ -79,25 +76,15 @@ def _likeliest_lag(own: Array, others: Array, fewest: int) -> int:
 
 FloorKind = Literal["repetitions", "high_frequency", "none"]
 
-STOP_BAND = 1.5
-"""Frequencies from which the band's filter passes nothing, relative to its cut-off."""
-
-OPEN = 0.9
-"""…and up to which a recording's own anti-aliasing passes all, relative to its Nyquist frequency."""
-
-FEWEST_FREQUENCIES = 16
-"""Frequencies between the two that a density is told by."""
-
-SEGMENT_S = 2.0
-"""Length of a segment of Welch's method [s]."""
+STOP_BAND = 1.5  # frequencies from which the band's filter passes nothing, relative to its cut-off
+OPEN = 0.9  # …and up to which a recording's own anti-aliasing passes all, relative to its Nyquist frequency
+FEWEST_FREQUENCIES = 16  # frequencies between the two that a density is told by
+SEGMENT_S = 2.0  # length of a segment of Welch's method [s]
 
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """Rms of the noise in the common band [Nm or N]; None where nothing tells it.
-
-    Repetitions differ by noise alone. Noise above the band says what is within it as far as it is white.
-    """
+    """Rms of noise in the common band [Nm or N]; None where neither repetitions nor noise above the band tell it."""
 
     rms: float | None
     kind: FloorKind
@@ -112,11 +99,11 @@ def noise_floors(diagnosis: Diagnosis, motions: Sequence[MotionRows]) -> list[No
         ("repetitions", noise_between(motions)),
         ("high_frequency", noise_above_band(observations, model, diagnosis.cutoff_hz)),
     ]
-    return [_first_known([(kind, float(rms[joint])) for kind, rms in known]) for joint in range(len(known[0][1]))]
-
-
-def _first_known(known: Sequence[tuple[FloorKind, float]]) -> NoiseFloor:
-    return next((NoiseFloor(rms, kind) for kind, rms in known if np.isfinite(rms)), NoiseFloor(None, "none"))
+    floors = []
+    for joint in range(len(known[0][1])):
+        told = (NoiseFloor(float(rms[joint]), kind) for kind, rms in known if np.isfinite(rms[joint]))
+        floors.append(next(told, NoiseFloor(None, "none")))
+    return floors
 
 
 def noise_between_periods(observations: Observations, model: ExtendedModel) -> Array:
@@ -131,10 +118,7 @@ def noise_between_periods(observations: Observations, model: ExtendedModel) -> A
 
 
 def noise_above_band(observations: Observations, model: ExtendedModel, cutoff_hz: float) -> Array:
-    """Rms in the band of white noise of the density above it, (n,) [Nm or N]; NaN where the band is open.
-
-    `cutoff_hz`: of the band [Hz].
-    """
+    """Rms in the band of white noise of the density above it, (n,) [Nm or N]; NaN where the band is open."""
     joints = observations.robot.joint_count
     power, weight = np.zeros(joints), 0.0
     for piece in observations:

@@ -12,9 +12,7 @@ from tauscope.headroom.learners import LEARNERS, Learner
 from tauscope.headroom.motion_rows import Inputs, MotionRows, joint_inputs
 from tauscope.recording.recording import Array
 
-FOLDS = 5
-"""Parts of the training motion, each of which is predicted from the others."""
-
+FOLDS = 5  # parts of the training motion, each of which is predicted from the others
 Folds = NDArray[np.intp]
 
 
@@ -35,10 +33,7 @@ class Choice:
     members: tuple[Member, ...] = ()
 
     def predict(self, inputs: Inputs, target: Array, judged: Inputs) -> Array:
-        """Learn from all training rows, and predict others, (J,).
-
-        `target`: (R,), what is to be predicted of the training rows [Nm or N].
-        """
+        """Learn `target`, (R,) [Nm or N], from all training rows, and predict others, (J,)."""
         total = np.zeros(len(judged.columns))
         for each in self.members:
             total += each.weight * each.learner.predict(inputs, target, judged)[each.size]
@@ -46,10 +41,7 @@ class Choice:
 
 
 def fold_numbers(motions: Sequence[MotionRows]) -> list[Folds]:
-    """Folds of every row, (R,): by part of the motion, and by recording where there are several.
-
-    A motion that repeats is cut alike in every repetition: no fold has rows of the same motion as another.
-    """
+    """Folds of every row, (R,), by recording and part of the motion: no two hold rows of the same repeated motion."""
     recordings = sorted({each.recording for each in motions})
     splits = [np.concatenate([np.floor(each.progress * FOLDS).astype(np.intp) for each in motions])]
     if len(recordings) > 1:
@@ -59,12 +51,7 @@ def fold_numbers(motions: Sequence[MotionRows]) -> list[Folds]:
 
 
 def choose_black_box(inputs: Inputs, target: Array, splits: Sequence[Folds], learners: Sequence[Learner]) -> Choice:
-    """The learners' sizes and weights of the smallest error on folds that they have not learned from.
-
-    Of several splits, the one by which most is predicted: motion may be told by other recordings, or by its neighbours.
-
-    `target`: (R,), what is to be predicted [Nm or N].
-    """
+    """Sizes and weights of learners of least error on unseen folds of the best split; `target`: (R,) [Nm or N]."""
     choices = [_stack(inputs, target, folds, learners) for folds in splits]
     return min(choices, key=lambda each: each.error)
 
@@ -89,20 +76,13 @@ def _stack(inputs: Inputs, target: Array, folds: Folds, learners: Sequence[Learn
     return Choice(float(left**2) / energy, tuple(Member(*each) for each in members if each[-1] > 0.0))
 
 
-MOST_ROWS = 6000
-"""Training rows of one joint that a black box learns from: evenly thinned beyond, to bound its time."""
+MOST_ROWS = 6000  # training rows of one joint that a black box learns from: evenly thinned beyond, to bound its time
+FEWEST_ROWS = 100  # training rows below which nothing is learned: five leaves of a tree
+BLOCK_S = 1.0  # shortest block of held-out motion whose gains count as independent [s]
 
-FEWEST_ROWS = 100
-"""Training rows below which nothing is learned: five leaves of a tree."""
-
-BLOCK_S = 1.0
-"""Shortest block of held-out motion whose gains count as independent [s]."""
-
+# Blocks of all held-out motion: longer ones where there is more of it, so that slow errors stay within one.
 MOST_BLOCKS = 20
-"""Blocks of all held-out motion: longer ones where there is more of it, so that slow errors stay within one."""
-
-STANDARD_ERRORS = 2.0
-"""Standard errors that a gain exceeds chance by, of normal blocks in any number."""
+STANDARD_ERRORS = 2.0  # standard errors that a gain exceeds chance by, of normal blocks in any number
 
 
 @dataclass(frozen=True)
@@ -129,12 +109,7 @@ class JointHeadroom:
 
 
 def joint_headroom(training: Sequence[MotionRows], held_out: Sequence[MotionRows], joint: int) -> JointHeadroom:
-    """Train black boxes on the training motion, and judge the chosen one once on held-out motion.
-
-    They start from the model with all findings: from the nominal model they would have to learn those again.
-
-    `joint`: index, from 0.
-    """
+    """Train black boxes from the model with all findings, and judge the chosen one once on held-out motion."""
     known, asked = _rows(training, joint), _rows(held_out, joint)
     plain, explained = (_residual(held_out, model, joint) for model in ("plain", "explained"))
     left = np.full_like(explained, np.nan)
@@ -148,11 +123,7 @@ def joint_headroom(training: Sequence[MotionRows], held_out: Sequence[MotionRows
 
 
 def compare_residuals(plain: Array, explained: Array, left: Array, blocks: NDArray[np.intp]) -> JointHeadroom:
-    """Rms of each, and how much less is left than by the explained model.
-
-    `plain`, `explained`, `left`: (R,), residuals of both models and of the black box [Nm or N]; `blocks`: (R,) int,
-    number of every row's block.
-    """
+    """Rms of `plain`, `explained`, `left`, (R,), and how much less is left than explained, by `blocks`, (R,)."""
     energy = max(float(explained @ explained), np.finfo(float).tiny)
     _, place = np.unique(blocks, return_inverse=True)
     gains = np.bincount(place, explained**2 - left**2) if len(place) else np.zeros(0)

@@ -9,32 +9,22 @@ import numpy as np
 from tauscope.headroom.motion_rows import Inputs
 from tauscope.recording.recording import Array
 
-TREES = (10, 20, 40, 80, 160)
-"""Numbers of trees to choose from."""
-
+TREES = (10, 20, 40, 80, 160)  # numbers of trees to choose from
 LEARNING_RATE = 0.1
 FEWEST_IN_LEAF = 20
 
-LANDMARKS = 300
-"""Rows that a kernel compares every other row with (Nyström)."""
-
-RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
-"""Ridge weights to choose from, a row."""
+LANDMARKS = 300  # rows that a kernel compares every other row with (Nyström)
+RIDGES = (1e-3, 1e-2, 1e-1, 1.0)  # ridge weights to choose from, a row
 
 
-CHUNK = 8192
-"""Rows that a kernel predicts at once: bounds memory."""
+CHUNK = 8192  # rows that a kernel predicts at once: bounds memory
 
 
 class Learner(Protocol):
     """A black box of one kind."""
 
     def predict(self, inputs: Inputs, target: Array, judged: Inputs) -> Mapping[float, Array]:
-        """Learn from some rows and predict others, by size of the black box.
-
-        `target`: (R,), what is to be predicted of the rows that are learned from [Nm or N]. Returns mapping of float to
-        (J,), predictions for the judged rows [Nm or N].
-        """
+        """Learn `target`, (R,), of some rows and predict others, (J,), by size of the black box [Nm or N]."""
         ...
 
 
@@ -45,11 +35,7 @@ class BoostedTrees:
     leaves: int
 
     def predict(self, inputs: Inputs, target: Array, judged: Inputs) -> Mapping[float, Array]:
-        """By number of trees.
-
-        `target`: (R,), what is to be predicted of the rows that are learned from [Nm or N]. Returns mapping of float to
-        (J,), predictions for the judged rows [Nm or N].
-        """
+        """By number of trees; `target`: (R,), predictions (J,) [Nm or N]."""
         from sklearn.ensemble import HistGradientBoostingRegressor
 
         model = HistGradientBoostingRegressor(
@@ -67,20 +53,13 @@ class BoostedTrees:
 
 @dataclass(frozen=True)
 class KernelRidge:
-    """Ridge regression on a Gaussian kernel and the columns themselves, all standardised.
-
-    k(x, y) = exp(-‖x - y‖² / (2 w² d)) with d columns.
-    """
+    """Ridge regression on d standardised columns and a Gaussian kernel, k(x, y) = exp(-‖x - y‖² / (2 w² d))."""
 
     width: float
     own_joint: bool
 
     def predict(self, inputs: Inputs, target: Array, judged: Inputs) -> Mapping[float, Array]:
-        """By ridge weight.
-
-        `target`: (R,), what is to be predicted of the rows that are learned from [Nm or N]. Returns mapping of float to
-        (J,), predictions for the judged rows [Nm or N].
-        """
+        """By ridge weight; `target`: (R,), predictions (J,) [Nm or N]."""
         from sklearn.kernel_approximation import Nystroem
 
         count = inputs.own if self.own_joint else inputs.columns.shape[1]
@@ -103,10 +82,10 @@ class KernelRidge:
         return dict(zip(RIDGES, mean + np.concatenate(predicted).T, strict=True))
 
 
+# All that are tried at every joint.
 LEARNERS: tuple[Learner, ...] = (
     BoostedTrees(8),
     BoostedTrees(32),
     KernelRidge(0.3, own_joint=True),
     KernelRidge(1.0, own_joint=False),
 )
-"""All that are tried at every joint."""

@@ -10,24 +10,18 @@ from tauscope.recording.recording import Array
 
 @dataclass(frozen=True, eq=False)
 class MotionRows:
-    """Evenly spaced rows of one piece of motion, in the band in which models and torque are compared.
-
-    `progress`: (M,), part of the recording's motion that is over, 0 to 1; alike in every repetition of a motion.
-    `position`, `velocity`, `acceleration`, `load`: (n, M), q, q̇, q̈ and the rigid-body torque [SI].
-    `torque`, `plain`, `explained`: (n, M), measured, by the nominal model, and by the model with all findings [Nm or
-        N].
-    """
+    """Evenly spaced rows of one piece of motion, in the band in which models and torque are compared."""
 
     recording: int  # number of the recording
     time: Array  # (M,), since the beginning of the recording [s]
-    progress: Array
-    position: Array
+    progress: Array  # (M,), part of the recording's motion that is over, 0 to 1; alike in every repetition of a motion
+    position: Array  # (n, M), q; as are q̇, q̈ [SI]
     velocity: Array
     acceleration: Array
-    load: Array
-    torque: Array
-    plain: Array
-    explained: Array
+    load: Array  # (n, M), rigid-body torque [Nm or N]
+    torque: Array  # (n, M), measured [Nm or N]
+    plain: Array  # (n, M), by the nominal model
+    explained: Array  # (n, M), by the model with all findings
     used: NDArray[np.bool_]  # (n, M), rows that rest on measured torque
 
 
@@ -44,12 +38,7 @@ class Inputs:
 
 
 def joint_inputs(motion: MotionRows, joint: int) -> Inputs:
-    """Columns of one joint's black box, a row each: q, q̇, q̈, load, and q̇, q̈ one row earlier and later, of all joints.
-
-    And the travel of the joint since its last reversal.
-
-    `joint`: index, from 0.
-    """
+    """Rows of a black box: q, q̇, q̈, load, also one row earlier and later, of all joints, and travel."""
     order = [joint, *(other for other in range(len(motion.position)) if other != joint)]
     now = (motion.position, motion.velocity, motion.acceleration, motion.load)
     beside = [shifted(values, step) for values in now[1:3] for step in (-1, 1)]
@@ -65,10 +54,7 @@ def shifted(values: Array, step: int) -> Array:
 
 
 def travel_since_reversal(position: Array, velocity: Array) -> Array:
-    """Way since the velocity last changed its sign, with that sign, (M,) [rad or m].
-
-    `position`, `velocity`: (M,), of one joint.
-    """
+    """Way since `velocity`, (M,), last changed its sign, with that sign, (M,); `position`: (M,)."""
     turns = np.flatnonzero(np.diff(np.signbit(velocity), prepend=np.signbit(velocity[:1])))
     last = np.searchsorted(turns, np.arange(len(position)), side="right")
     return position - position[np.append(0, turns)[last]]

@@ -46,20 +46,14 @@ class Autoregression:
 
     @property
     def long_run_ratio(self) -> float:
-        """Spectral density at frequency zero over that of white noise of the same variance, at least 1.
-
-        By this much a slowly varying coefficient's variance exceeds what independent residuals would give it.
-        """
+        """Spectral density at frequency zero over white noise's, ≥ 1: inflates a slow coefficient's variance."""
         if self.variance <= 0.0:
             return 1.0
         gain = 1.0 / (1.0 - self.coefficients.sum()) ** 2
         return max(1.0, float(self.innovation_variance * gain / self.variance))
 
     def colour(self, columns: Array) -> Array:
-        """Columns run through σ_ε / a(z): their Gram matrix is LᵀΩL, Ω the residual's covariance.
-
-        `columns`: (k, M), signals, time last.
-        """
+        """`columns`, (k, M), run through σ_ε / a(z): their Gram matrix is LᵀΩL, Ω the residual's covariance."""
         scale = np.sqrt(self.innovation_variance)
         if self.order == 0:
             return columns * scale
@@ -68,21 +62,15 @@ class Autoregression:
 
 @dataclass(frozen=True, eq=False)
 class LaggedProducts:
-    """Σ e_t e_{t+k} of one stretch of a residual, and how many products that are.
+    """Σ e_t e_{t+k} of one stretch of a residual, and how many products that are."""
 
-    `products`, `counts`: (K + 1,), for the lags k = 0 … K; pairs of which one was not measured are left out of both.
-    """
-
-    products: Array
-    counts: Array
+    products: Array  # (K + 1,), for the lags k = 0 … K; pairs of which one was not measured are left out
+    counts: Array  # (K + 1,), of the products
     spans: Array  # (K + 1,), pairs that there would be if all had been measured
 
     @staticmethod
     def of(residual: Array, used: NDArray[np.bool_], lags: int = LARGEST_ORDER) -> "LaggedProducts":
-        """The products of consecutive samples, those left out that do not count.
-
-        `residual`: (M,), consecutive samples; `used`: (M,), which of them count.
-        """
+        """The products of consecutive samples `residual`, (M,), of which those `used`, (M,), count."""
         sums = LaggedProducts(np.zeros(lags + 1), np.zeros(lags + 1), np.zeros(lags + 1))
         whole = bool(used.all())
         kept = residual if whole else np.where(used, residual, 0.0)
@@ -103,11 +91,7 @@ class AutocovarianceSum:
         self._white = np.zeros(lags + 1)
 
     def add(self, piece: LaggedProducts, filtered_white: Array | None = None) -> None:
-        """Add one piece.
-
-        `filtered_white`: (K + 1,) or None, autocovariance of white noise that passed the filter which the residual
-        passed; None where it passed none.
-        """
+        """Add one piece; `filtered_white`: (K + 1,), of white noise that passed its filter, None where none."""
         both = slice(min(len(piece.products), len(self._sums.products)))
         self._sums.products[both] += piece.products[both]
         self._sums.counts[both] += piece.counts[both]

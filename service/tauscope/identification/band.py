@@ -18,7 +18,7 @@ import numpy as np
 from scipy import signal
 
 from tauscope.dynamics.base_parameters import BaseParameters
-from tauscope.dynamics.regressor import torque_regressor
+from tauscope.dynamics.rigid_body import mass_matrix
 from tauscope.identification.dataset import Dataset, PreparedMotion, rms_speed
 from tauscope.identification.friction_shape import ORDINARY
 from tauscope.identification.least_squares import factorise
@@ -55,10 +55,7 @@ SMOOTHING = np.sqrt(2.0)
 
 
 def choose_cutoff(conditioners: Sequence[Conditioner], robot: Robot, base: BaseParameters) -> float | None:
-    """Cut-off of the common band, chosen from the data.
-
-    Returns cut-off [Hz]; None where the positions are clean enough for no filter.
-    """
+    """Cut-off of the common band, chosen from the data [Hz]; None where the positions need no filter."""
     conditioners = [_beginning(conditioner) for conditioner in conditioners]
     quiet = quiet_limit(conditioners)
     if quiet is None:
@@ -156,7 +153,9 @@ def _quiet_band(
     """
     prepared = next(iter(motions))
     chosen = np.linspace(0, len(prepared.motion.position) - 1, PROBED_POSTURES).astype(int)
-    inertia = _inertia(structure, parameters, prepared.motion.position[chosen])
+    standard = np.zeros(10 * structure.robot.link_count)  # base parameters as those that lead them
+    standard[structure.base.independent_columns] = parameters[: structure.base_count]
+    inertia = mass_matrix(structure.robot, standard, prepared.motion.position[chosen])
     sources = [conditioner.source.in_band(motions.cutoff_hz) for conditioner in conditioners]
     from_position = np.array([[name == Source.POSITION for name in source.names] for source in sources])
     density = np.mean([c.noise.density for c in conditioners] * from_position, axis=0)
@@ -180,10 +179,7 @@ def _passed_share(motion: Motion, motions: Dataset) -> float:
 
 
 def _unrepeated_power(prepared: PreparedMotion) -> Array:
-    """Variance of what torque does not repeat from period to period, in the band, (n,); infinite where nothing repeats.
-
-    Measured samples alone tell it; one that was missed counts as its period's mean.
-    """
+    """Variance of measured torque that differs between periods, in the band, (n,); infinite if nothing repeats."""
     motion = prepared.motion
     if motion.repetitions == 1:
         return np.full(motion.torque.shape[2], np.inf)
@@ -195,35 +191,16 @@ def _unrepeated_power(prepared: PreparedMotion) -> Array:
 def _independent_share(motion: Motion, noise_std: Array) -> Array:
     """Share of the positions' noise that is another in every period, (n,); 1 where nothing was averaged.
 
-    Rows that stand for P periods are weighted by √P, so that independent noise counts in them as in one period.
-    Rounding that is the same in every period, as where the motion repeats to the sample, is not averaged: it counts P
-    times.
+    Rows that stand for P periods are weighted by √P: independent noise counts as in one period, rounding that is the
+    same in every period P times.
     """
     if motion.scatter is None:
         return np.ones(len(noise_std))
     return np.minimum(motion.scatter**2 / np.maximum(noise_std**2, np.finfo(float).tiny), 1.0)
 
 
-def _inertia(structure: ModelStructure, parameters: Array, position: Array) -> Array:
-    """Mass matrix at some postures, (N, n, n), from the base parameters: torque at q̈ = e_k less that at rest."""
-    postures, count = position.shape
-    still = np.zeros_like(position)
-    columns = np.asarray(structure.base.independent_columns)
-
-    def torque(acceleration: Array) -> Array:
-        regressor = torque_regressor(structure.robot, position, still, acceleration, columns=columns)
-        return regressor @ parameters[: structure.base_count]
-
-    rest = torque(still)
-    units = np.eye(count)
-    return np.stack([torque(np.tile(unit, (postures, 1))) - rest for unit in units], axis=2)
-
-
 def _crossing(motions: Dataset, structure: ModelStructure, parameters: Array, residual_std: Array) -> float | None:
-    """Lowest frequency above the motion's own at which the model leaves more than half of the torque unexplained.
-
-    Measured, not modelled torque is compared: noise of the positions makes modelled torque, which explains nothing.
-    """
+    """Lowest frequency above the motion's at which more than half of the measured torque is unexplained."""
     frequency = np.linspace(0.0, motions.cutoff_hz or 0.0, SPECTRUM_POINTS + 1)[1:]
     measured, unexplained = np.zeros(SPECTRUM_POINTS), np.zeros(SPECTRUM_POINTS)
     for prepared in motions:

@@ -37,13 +37,7 @@ def parameter_covariance(
     *,
     scale_std: Sequence[float] = (),
 ) -> Array:
-    """Covariance of all parameters, with the estimated shape constants appended.
-
-    `parameters`: (p,), the estimate.
-    `weight`: (n,), w_j, the weights that the estimate was made with.
-    `scale_std`: s_j, one a joint; empty where torque was measured.
-    Returns (p + s, p + s), covariance of Θ and of the logarithms of the shape constants.
-    """
+    """Covariance (p + s, p + s) of Θ, `parameters`, (p,), and log shape constants; `weight`: w_j, (n,)."""
     size = structure.size + len(shapes)
     bread, meat = np.zeros((size, size)), np.zeros((size, size))
     if posterior is not None:
@@ -85,14 +79,10 @@ def uncertain_torque(
     covariance: Array,
     noise_std: Array,
 ) -> Array:
-    """Root mean square of the torque that parameters and friction at rest leave uncertain, √(mean of a S aᵀ + v σ²).
+    """Rms of torque that parameters and friction at rest leave uncertain, √(mean of a S aᵀ + v σ²), (n,).
 
-    a are the rows of a joint, v is what `PreparedMotion` says of friction at rest.
-
-    `parameters`: (p,), the coefficients, for the amplitudes of the shape constants.
-    `covariance`: (p + s, p + s), S, of the parameters and of the logarithms of the estimated shape constants.
-    `noise_std`: (n,), σ of a row [Nm or N].
-    Returns (n,), in the common band [Nm or N].
+    a: rows of a joint; v: of rest, as `PreparedMotion` says; `parameters`: (p,); `covariance`: (p + s, p + s), S, of
+    these and log shape constants; `noise_std`: (n,), σ [Nm or N].
     """
     squares, resting, count = np.zeros((3, structure.robot.joint_count))
     for prepared in motions:

@@ -26,11 +26,7 @@ FEWEST_AT_REST = 3  # samples that tell rest from a turning point
 
 @dataclass(frozen=True, eq=False)
 class PreparedMotion:
-    """One piece of motion with its rigid-body columns.
-
-    `rigid`: tuple of (m_j, N), length n, base regressor L at the recorded rate: of each joint's row the columns of the
-    links that it moves.
-    """
+    """One piece of motion; `rigid`: (m_j, N) a joint, columns of the links that it moves, at the recorded rate."""
 
     motion: Motion
     rigid: tuple[Array, ...]
@@ -102,10 +98,7 @@ class PreparedMotion:
         return np.stack(outward) + motion.band.reduce(np.stack(others))
 
     def predict_torque(self, structure: ModelStructure, candidates: Array) -> Array:
-        """Model torque at the recorded rate, before any filter, of several parameter sets at once.
-
-        `candidates`: (c, p), parameter sets. Returns (c, n, N), torque of every set at every joint.
-        """
+        """Torque, (c, n, N), at the recorded rate, before any filter, of parameter sets `candidates`, (c, p)."""
         motion = self.motion
         samples, count = motion.position.shape
         torque = np.empty((len(candidates), count, samples))
@@ -161,11 +154,7 @@ class Dataset:
 def prepared_motion(
     motion: Motion, robot: Robot, base: BaseParameters, recording: int, resolution: Array | None = None
 ) -> PreparedMotion:
-    """One piece of motion with its rigid-body columns, at the recorded rate and in the common band.
-
-    `resolution`: (n,) or None, change of position that is told from noise [rad or m]; None where rest is not looked
-    for.
-    """
+    """One piece with its rigid-body columns; `resolution`: (n,), least motion that is none of the noise, for rest."""
     regressor = TorqueRegressor(robot, columns=base.independent_columns)
     whole = np.empty((robot.joint_count, regressor.column_count, len(motion.position)))
     regressor.write_shares(motion.position, motion.velocity, motion.acceleration, whole)

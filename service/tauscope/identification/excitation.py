@@ -38,10 +38,7 @@ def measure_excitation(motions: Iterable[PreparedMotion]) -> Excitation:
 
 
 def thin(signals: Array, most: int = MOST_SAMPLES) -> Array:
-    """Every so many rows of a piece, so that a long recording is not held in memory.
-
-    `signals`: (N, n), one row a sample.
-    """
+    """Every so many rows of `signals`, (N, n), so that a long recording is not held in memory."""
     return signals[:: -(-len(signals) // most)].copy()
 
 

@@ -56,11 +56,9 @@ def project_grids(
     noise_std: Array,
     slopes: list[Array],
 ) -> list[JointGrid]:
-    """Candidate columns of every joint, projected off the shared ones; one pass over the data.
+    """Candidate columns of every joint, projected off the `shared` ones, (z,) int; one pass over the data.
 
-    `shared`: (z,) int, its global columns that do not depend on any shape constant, ascending.
-    `noise_std`: (n,), residual standard deviation of every joint, for the weights [Nm or N].
-    `slopes`: list of (g,), length n, every joint's candidates [s/rad or s/m].
+    `noise_std`: (n,), of residuals, for the weights [Nm or N]; `slopes`: (g,) a joint, candidates [s/rad or s/m].
     """
     joints = range(structure.robot.joint_count)
     gram = [np.zeros((len(values) + 1, len(values) + 1)) for values in slopes]
@@ -95,12 +93,9 @@ def total_gain(grids: list[JointGrid], chosen: list[list[int]]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Conditional:
-    """One joint's candidates after the chosen columns of all other joints are projected off as well.
+    """One joint's candidates after the chosen columns of all other joints are projected off as well."""
 
-    `gram`: (g + 1, g + 1), Gram matrix of the candidates; `target`: (g + 1,), their products with the torque.
-    """
-
-    gram: Array
+    gram: Array  # (g + 1, g + 1), Gram matrix of the candidates; `target`: (g + 1,), their products with the torque
     target: Array
 
     @staticmethod
@@ -157,25 +152,17 @@ SWEEPS = 4
 
 @dataclass(frozen=True)
 class EstimatedShape:
-    """Shape constants of one joint.
-
-    `delta`: slope of the Stribeck term [s/rad or s/m]; None where the data show no such term.
-    `k_v_identifiable`, `delta_identifiable`: False where the data cannot tell the constant.
-    `k_v_given`, `delta_given`: True where the robot file states it.
-    """
+    """Shape constants of one joint."""
 
     k_v: float  # slope of the step at zero velocity [s/rad or s/m]
-    delta: float | None
-    k_v_identifiable: bool
+    delta: float | None  # slope of the Stribeck term [s/rad or s/m]; None where the data show no such term
+    k_v_identifiable: bool  # False where the data cannot tell it
     delta_identifiable: bool
-    k_v_given: bool
+    k_v_given: bool  # True where the robot file states it
     delta_given: bool
 
     def open_at_limit(self) -> "EstimatedShape":
-        """The shape, its constants open where δ is at the limit of its range.
-
-        Two steps as near as they may be are one step of another form than an arctangent, and no fall with speed.
-        """
+        """The shape, open where δ is at its limit: two such near steps are one of another form than an arctangent."""
         if self.delta is None or self.delta_given or self.delta * SEPARATION < AT_LIMIT * self.k_v:
             return self
         return replace(self, k_v_identifiable=self.k_v_given, delta_identifiable=False)
@@ -191,15 +178,14 @@ def estimate_shapes(
     speed: Array,
     tight: Sequence[bool] | None = None,
 ) -> tuple[EstimatedShape, ...]:
-    """Shape constants of all joints; those that the robot file states are kept.
+    """Shape constants of all joints; those stated are kept. `noise_std`: (n,), by which rows are weighted.
 
-    `noise_std`: (n,), residual standard deviation in the common band, for the weights.
-    `unit`: (n,), one noise variance, inflated by autocorrelation, relative to `noise_std`²: the measure of what the
-    data can tell; zeros for the best candidates whatever they are worth.
-    `speed`: (n,), rms velocity of every joint, which the candidates are relative to [rad/s or m/s].
+    `unit`: (n,), one noise variance, inflated by autocorrelation, over `noise_std`²; zeros for the best candidates
+    whatever they are worth. `speed`: (n,), rms velocity, which candidates are relative to [rad/s or m/s].
     """
     given = [joint.friction_shape for joint in structure.robot.joints]
-    shared = _shared_columns(structure)
+    steps = [*structure.coefficients("stiction").values(), *structure.coefficients("stribeck").values()]
+    shared = np.setdiff1d(np.arange(structure.size), steps)
     without_steps = restrict(factors, shared)
     solution = solve(without_steps, len(shared), noise_std)
     slopes = _candidate_slopes(speed, given)
@@ -222,17 +208,9 @@ def estimate_shapes(
 
 def _candidate_slopes(speed: Array, given: Sequence[FrictionShape]) -> list[Array]:
     """Per joint a logarithmic grid relative to its rms velocity, then the stated constants."""
-    grids = []
-    for shape, typical in zip(given, speed, strict=True):
-        grid = np.logspace(*GRID_DECADES, GRID_POINTS) / typical
-        stated = [value for value in (shape.k_v, shape.delta) if value is not None]
-        grids.append(np.append(grid, stated))
-    return grids
-
-
-def _shared_columns(structure: ModelStructure) -> NDArray[np.intp]:
-    steps = [*structure.coefficients("stiction").values(), *structure.coefficients("stribeck").values()]
-    return np.setdiff1d(np.arange(structure.size), steps)
+    grid = np.logspace(*GRID_DECADES, GRID_POINTS)
+    stated = [[value for value in (shape.k_v, shape.delta) if value is not None] for shape in given]
+    return [np.append(grid / typical, own) for typical, own in zip(speed, stated, strict=True)]
 
 
 def _search(grids: list[JointGrid], given: Sequence[FrictionShape]) -> list[list[int]]:
@@ -267,12 +245,6 @@ def _plain_options(grid: JointGrid, shape: FrictionShape) -> list[list[int]]:
     return [[k, stated] for k in _steps(grid, shape) if grid.slopes[k] >= SEPARATION * shape.delta]
 
 
-def _stribeck_options(grid: JointGrid, shape: FrictionShape) -> list[list[int]]:
-    """Pairs of constants with a Stribeck term, for joints whose file states no δ."""
-    slopes = grid.slopes
-    return [[k, d] for k in _steps(grid, shape) for d in range(GRID_POINTS) if slopes[k] >= SEPARATION * slopes[d]]
-
-
 def _described(
     conditional: Conditional,
     grid: JointGrid,
@@ -284,10 +256,8 @@ def _described(
 ) -> EstimatedShape:
     """The joint's constants refined, with what the data can tell about them; `unit` is one noise variance.
 
-    A gentle step has a long tail: A(K_v v) = 1 - 2/(π K_v v) for large v. It stands in for viscous friction that bends
-    with speed, which the model has no other column for, and the slope it takes for that is wrong at the low speeds that
-    it is there for. So K_v is known only where the passage through zero tells it: where steeper steps fit clearly worse
-    even beside a column v|v|. That column is for the question alone and never in the model.
+    A gentle step's long tail, A(K_v v) = 1 - 2/(π K_v v), stands in for viscous friction that bends with speed: K_v
+    is known only where steeper steps fit clearly worse even beside a column v|v|, which the model never has.
     """
     slopes = grid.slopes
     k_v, k_v_known = float(slopes[indices[0]]), True
@@ -342,11 +312,9 @@ def _with_stribeck(
     variance: float,
     residual_energy: float,
 ) -> list[int]:
-    """The best pair [K_v, δ] where it explains enough more than K_v alone, else the plain choice.
-
-    K_v alone may lie between two grid points: it is given the next point's column too, which spans what lies between.
-    """
-    pairs = _stribeck_options(grid, shape)
+    """The best pair [K_v, δ] where it explains enough more than K_v, with the next grid point's column, alone."""
+    slopes = grid.slopes
+    pairs = [[k, d] for k in _steps(grid, shape) for d in range(GRID_POINTS) if slopes[k] >= SEPARATION * slopes[d]]
     if not pairs:
         return plain
     gains = conditional.gains(pairs, physical=True)
@@ -360,12 +328,7 @@ def _with_stribeck(
 
 
 def gentle_range(k_v: float, speed: float) -> tuple[float, float]:
-    """Between which slopes a δ stands for a term of its own: gentler ones are viscous friction, steeper ones K_v's.
-
-    `k_v`: slope of the step at zero velocity [s/rad or s/m].
-    `speed`: the joint's rms velocity [rad/s or m/s].
-    Returns gentlest and steepest δ [s/rad or s/m].
-    """
+    """Gentlest and steepest δ that is a term of its own: others are viscous friction, or K_v's [s/rad or s/m]."""
     return STRAIGHT / speed, k_v / SEPARATION
 
 

@@ -4,18 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tauscope.identification.consistency import FrictionColumns
+from tauscope.identification.consistency.inequalities import FrictionColumns
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
 
 @dataclass(frozen=True, eq=False)
 class FullParameters:
-    """Θ* = M x, a model in its own columns from full parameters x of shape (q,).
-
-    `map`: (p, q), M: base parameters Θ_L + B Θ_K of the links' ten parameters each, then the joints' coefficients as
-    they are.
-    """
+    """Θ* = M x, M (p, q): base parameters Θ_L + B Θ_K of the links, then the joints' coefficients as they are."""
 
     map: Array
     friction: FrictionColumns

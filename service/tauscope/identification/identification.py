@@ -1,7 +1,6 @@
 """From a robot and recordings to parameters: the whole way, in the order of the steps."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -25,17 +24,14 @@ from tauscope.identification.posterior import Posterior, infer
 from tauscope.identification.residuals import Fit, ResidualStatistics, evaluate
 from tauscope.identification.signs import gravity_scale, reversed_joints
 from tauscope.identification.structure import ModelStructure
-from tauscope.recording.conditioning import Conditioner, ConditioningSummary
+from tauscope.recording.conditioning import Conditioner, ConditioningEntry
 from tauscope.recording.recording import Array, Recording
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import Robot
 
 
 def require_motion(conditioners: Sequence[Conditioner]) -> None:
-    """Refuse recordings in which no joint leaves the noise of its own encoder.
-
-    Raises IdentificationError, which names the recordings.
-    """
+    """Raise IdentificationError where no joint leaves the noise of its own encoder in any recording."""
     if not any(conditioner.moving.any() for conditioner in conditioners):
         names = ", ".join(conditioner.recording.name for conditioner in conditioners)
         raise IdentificationError(
@@ -50,10 +46,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Options:
-    """What a user may ask of an identification.
-
-    `cutoff_hz`: band that torque and regressor share [Hz]; None for no filter; chosen from the data by default.
-    """
+    """What a user may ask of an identification; `cutoff_hz` is chosen from the data, None for no filter."""
 
     estimator: Estimator = Estimator.WLS
     cutoff_hz: float | Literal["auto"] | None = "auto"
@@ -63,12 +56,7 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """A model of the arm with what is known about its uncertainty.
-
-    `undetermined`: (p,), parameters about which the recordings say nothing.
-    `predicted_train`, `predicted_held_out`: (n,), residual at the recorded rate that noise and covariance lead to
-    expect [Nm or N].
-    """
+    """A model of the arm with what is known about its uncertainty."""
 
     robot: Robot
     structure: ModelStructure
@@ -80,16 +68,16 @@ class Identification:
     gravity_scale: float | None  # torque of gravity over that of the stated links; None where it cannot be told
     posterior: Posterior
     covariance: Array  # (p + s, p + s), of the parameters, and of the logarithms of the estimated shape constants
-    undetermined: np.ndarray
+    undetermined: np.ndarray  # (p,), parameters about which the recordings say nothing
     shapes: tuple[EstimatedShape, ...]
     consistent: ConsistentParameters
     condition_number: float
     residuals: ResidualStatistics
     free_fit: Fit
     price_of_bodies: Array  # (n,), training residual over that of the free estimate
-    predicted_train: Array
+    predicted_train: Array  # (n,), residual at the recorded rate that noise and covariance lead to expect [Nm or N]
     held_out: Fit | None
-    predicted_held_out: Array | None
+    predicted_held_out: Array | None  # (n,), the same of held-out motion [Nm or N]
     excitation: Excitation
     held_out_excitation: Excitation | None
     extrapolation: Array | None  # (n,) or None, share of the held-out torque's rms that training leaves uncertain
@@ -97,8 +85,8 @@ class Identification:
     cutoff_hz: float | None
     options: Options
     recording_warnings: tuple[ResultWarning, ...]
-    conditioning: tuple[ConditioningSummary, ...]
-    held_out_conditioning: tuple[ConditioningSummary, ...]
+    conditioning: tuple[ConditioningEntry, ...]
+    held_out_conditioning: tuple[ConditioningEntry, ...]
     identifiable: tuple[dict[str, bool], ...]
 
 
@@ -125,22 +113,24 @@ def identify(
     options: Options = Options(),
     progress: Progress = lambda step: None,
 ) -> Identification:
-    """Identify a robot arm from recordings.
-
-    Raises RecordingMismatchError where a recording has another number of joints than the robot. Raises RecordingError
-    where a recording is too short or too broken to be used. Raises IdentificationError where the recordings hold too
-    little for the parameters.
-    """
-    _require_joints(robot, (*recordings, *held_out))
+    """Identify an arm. Raises RecordingError for one too short, broken or of another arm, IdentificationError."""
+    for recording in (*recordings, *held_out):
+        if recording.joint_count != robot.joint_count:
+            raise RecordingMismatchError(
+                f"{recording.name}: has {recording.joint_count} joints, robot {robot.name} has {robot.joint_count}:"
+                " give the robot file that belongs to it"
+            )
     progress("condition recordings")
     base = base_parameters(robot)
     conditioners = [Conditioner.survey(recording, robot) for recording in recordings]
     require_motion(conditioners)
-    with _naming(recordings):
+    try:
         asked = options.cutoff_hz
         cutoff = choose_cutoff(conditioners, robot, base) if asked == "auto" else asked
         motions = Dataset(conditioners, robot, base, cutoff)
         found = _estimate(motions, options, progress)
+    except IdentificationError as error:
+        raise IdentificationError(f"{', '.join(recording.name for recording in recordings)}: {error}") from error
     structure = found.structure
     consistent_parameters = FullParameters.of(structure).map @ found.consistent.parameters
     parameters = consistent_parameters if options.prior else found.solution.parameters
@@ -218,15 +208,6 @@ def _predict_residual(
     return np.sqrt(outside + noise**2 + uncertain**2), uncertain
 
 
-def _require_joints(robot: Robot, recordings: Sequence[Recording]) -> None:
-    for recording in recordings:
-        if recording.joint_count != robot.joint_count:
-            raise RecordingMismatchError(
-                f"{recording.name}: has {recording.joint_count} joints, robot {robot.name} has {robot.joint_count}:"
-                " give the robot file that belongs to it"
-            )
-
-
 def _estimate(motions: Dataset, options: Options, progress: Progress) -> _Estimates:
     progress("choose model terms")
     structure, shapes, factors = choose_model(motions, motions.robot, motions.base, rotor_inertia=options.rotor_inertia)
@@ -240,14 +221,6 @@ def _estimate(motions: Dataset, options: Options, progress: Progress) -> _Estima
     progress("compare signs")
     wrong = reversed_joints(motions, structure, factors, ratios, posterior, consistent)
     return _Estimates(structure, shapes, factors, weights, solution, free, posterior, consistent, wrong)
-
-
-@contextmanager
-def _naming(recordings: Sequence[Recording]) -> Iterator[None]:
-    try:
-        yield
-    except IdentificationError as error:
-        raise IdentificationError(f"{', '.join(recording.name for recording in recordings)}: {error}") from error
 
 
 def _identifiable(found: _Estimates, covariance: Array) -> tuple[dict[str, bool], ...]:

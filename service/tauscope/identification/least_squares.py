@@ -30,10 +30,7 @@ PANEL = 8  # columns that are eliminated before the rest is updated by one matri
 
 @dataclass(frozen=True, eq=False)
 class JointFactor:
-    """Triangular factor of one joint's equations.
-
-    `columns`: (p_j,) int, global columns of the model; `triangle`: (p_j + 1, p_j + 1), R_j of [A_j | y_j].
-    """
+    """Triangular factor R_j, (p_j + 1, p_j + 1), of [A_j | y_j]; `columns`: (p_j,) int, their global places."""
 
     columns: NDArray[np.intp]
     triangle: Array
@@ -41,10 +38,7 @@ class JointFactor:
 
     @cached_property
     def least_squared_residual(self) -> float:
-        """‖A_j Θ_j - y_j‖² where the joint's equations are solved alone: the last entry of R_j, squared.
-
-        Where columns are zero or combinations but for rounding, rounding would decide over that entry.
-        """
+        """‖A_j Θ_j - y_j‖² of the joint solved alone: R_j's last entry, squared, unless rounding decides it."""
         columns, target = self.triangle[:, :-1], self.triangle[:, -1]
         if _is_well_conditioned(columns[:-1]):
             return float(target[-1] ** 2)
@@ -69,10 +63,7 @@ class Solution:
 
 
 def factorise(motions: Iterable[PreparedMotion], structure: ModelStructure) -> tuple[JointFactor, ...]:
-    """One pass over the data: every joint's triangular factor.
-
-    Raises IdentificationError where a joint has fewer measured rows than parameters.
-    """
+    """Triangular factors by one pass over the data. Raises IdentificationError for a joint of too few rows."""
     joints = range(structure.robot.joint_count)
     columns = [structure.joint_columns(joint) for joint in joints]
     triangles = [np.zeros((len(own) + 1, len(own) + 1), order="F") for own in columns]
@@ -96,21 +87,13 @@ def factorise(motions: Iterable[PreparedMotion], structure: ModelStructure) -> t
 
 
 def solve(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Solution:
-    """The (weighted) least-squares estimate.
-
-    Θ = argmin Σ_j ‖A_j Θ - y_j‖² / σ_j².
-
-    `noise_std`: (n,), σ_j; all ones for LS.
-    """
+    """Θ = argmin Σ_j ‖A_j Θ - y_j‖² / σ_j²; `noise_std`: (n,), σ_j, all ones for LS."""
     triangle = stacked_factor(factors, size, noise_std)
     return _solve(triangle[:size, :size], triangle[:size, size])
 
 
 def stacked_factor(factors: tuple[JointFactor, ...], size: int, noise_std: Array) -> Array:
-    """Triangular factor of all joints' equations together, (p + 1, p + 1).
-
-    `noise_std`: (n,), σ_j, by which the equations are divided.
-    """
+    """Triangular factor of all equations, each divided by its σ_j of `noise_std` (n,): (p + 1, p + 1)."""
     stacked = np.zeros((sum(len(factor.triangle) for factor in factors), size + 1))
     row = 0
     for factor, std in zip(factors, noise_std, strict=True):
@@ -122,10 +105,7 @@ def stacked_factor(factors: tuple[JointFactor, ...], size: int, noise_std: Array
 
 
 def restrict(factors: tuple[JointFactor, ...], keep: NDArray[np.intp]) -> tuple[JointFactor, ...]:
-    """The factors of a smaller model: columns left out without another pass over the data.
-
-    `keep`: (k,) int, its global columns that stay, ascending; they are numbered anew from 0.
-    """
+    """The factors of the columns `keep`, (k,) int, ascending and numbered anew, without another pass over the data."""
     position = np.full(max(int(factor.columns.max()) for factor in factors) + 1, -1)
     position[keep] = np.arange(len(keep))
     smaller = []
@@ -200,10 +180,7 @@ class Estimator(StrEnum):
 
 
 def estimate(factors: tuple[JointFactor, ...], size: int, estimator: Estimator) -> tuple[Array, Solution]:
-    """LS, or WLS with σ_j estimated from the residual and the equations solved again.
-
-    Returns tuple of (n,) and Solution, weights 1/σ_j (ones for LS), and the solution.
-    """
+    """Weights 1/σ_j, (n,), and the solution of LS, or of WLS with σ_j by the residual of LS."""
     if estimator is Estimator.LS:
         return np.ones(len(factors)), solve(factors, size, np.ones(len(factors)))
     std = single_joint_std(factors)

@@ -8,7 +8,7 @@ from scipy import stats
 
 from tauscope.dynamics.base_parameters import BaseParameters
 from tauscope.identification.band import preliminary_terms
-from tauscope.identification.consistency import LEAST_COULOMB
+from tauscope.identification.consistency.inequalities import LEAST_COULOMB
 from tauscope.identification.covariance import parameter_covariance
 from tauscope.identification.dataset import Dataset, rms_speed
 from tauscope.identification.friction_shape import EstimatedShape, estimate_shapes, shape_parameters
@@ -51,10 +51,7 @@ def choose_model(
 
 
 def _doubt_friction_at_rest(motions: Dataset, structure: ModelStructure) -> None:
-    """Give rows at rest the variance that friction has there: it holds with any torque up to its breakaway torque.
-
-    What it holds with is estimated by a model that doubts these rows: one whose friction is anywhere up to breakaway.
-    """
+    """Give rows at rest the variance that friction has there: any torque up to breakaway, by such a model."""
     if not any(prepared.at_rest.any() for prepared in motions):
         return
     posterior = infer(structure, factorise(motions, structure))
@@ -74,10 +71,7 @@ def _doubt_friction_at_rest(motions: Dataset, structure: ModelStructure) -> None
 
 
 def _estimate_shapes(motions: Dataset, structure: ModelStructure, speed: Array) -> tuple[EstimatedShape, ...]:
-    """Shape constants; a Stribeck term stays where it is far from zero against the residual that it leaves.
-
-    Its significance cannot be judged by the residual without it: what it would explain is the colour in that residual.
-    """
+    """Shape constants; a Stribeck term stays where it is far from zero against the residual that it leaves itself."""
     count = structure.robot.joint_count
     factors = factorise(motions, structure)
     noise_std, _ = _preliminary_residual(motions, structure, factors)
@@ -152,10 +146,7 @@ def _judge(
 
 
 def _stribeck_gain(structure: ModelStructure, parameters: Array, covariance: Array, joint: int) -> float:
-    """What a joint's Stribeck term takes off the criterion [noise variances]; 0 where friction does not fall.
-
-    (τ_sc/σ)², less what it costs to raise τ_s + τ_sc to `LEAST_COULOMB` of τ_s where it is below.
-    """
+    """What a Stribeck term takes off the criterion [noise variances] less the cost of `LEAST_COULOMB`; 0 if rising."""
     stiction, stribeck = (structure.coefficient(joint, name) for name in ("stiction", "stribeck"))
     if stiction is None or stribeck is None or parameters[stribeck] >= 0.0:
         return 0.0

@@ -5,13 +5,8 @@ from dataclasses import replace
 from scipy import stats
 
 from tauscope.errors import IdentificationError
-from tauscope.identification.consistency import (
-    ConsistentParameters,
-    Prior,
-    friction_inequalities,
-    mass_inequalities,
-    nearest_consistent_parameters,
-)
+from tauscope.identification.consistency import ConsistentParameters, Prior, nearest_consistent_parameters
+from tauscope.identification.consistency.inequalities import friction_inequalities, mass_inequalities
 from tauscope.identification.full_parameters import FullParameters
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array

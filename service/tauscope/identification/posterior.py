@@ -32,23 +32,17 @@ DETERMINED = 0.9  # share of the prior's variance that data take from a paramete
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """What prior and data together say of the parameters, before bodies and friction restrict them.
-
-    `weights`: (n,), 1/(σ_j √ρ_j), by which the joints' equations are multiplied.
-    `factor`, `target`: (p, p), (p,), R and z of the data's weighted equations.
-    `mean`: (p,), of the posterior, before bodies and friction restrict it.
-    `covariance`, `precision`: (p, p), S of the posterior, and P⁻¹ of the prior.
-    """
+    """What prior and data together say of the parameters, before bodies and friction restrict them."""
 
     prior: Prior
     doubt: Array  # (p,), deviation from the prior that the data show, in its standard deviations
     noise_std: Array  # (n,), σ_j of a row in the common band
-    weights: Array
-    factor: Array
-    target: Array
+    weights: Array  # (n,), 1/(σ_j √ρ_j), by which the joints' equations are multiplied
+    factor: Array  # (p, p), R of the data's weighted equations
+    target: Array  # (p,), z of these
     mean: Array
-    covariance: Array
-    precision: Array
+    covariance: Array  # (p, p), S of the posterior
+    precision: Array  # (p, p), P⁻¹ of the prior
 
     @property
     def learnt(self) -> Array:
@@ -67,10 +61,7 @@ def infer(
     ratios: Array | None = None,
     estimator: Estimator = Estimator.WLS,
 ) -> Posterior:
-    """The posterior of all parameters.
-
-    `ratios`: (n,) or None, ρ_j, long-run over white variance of each joint's residual; ones where it is not known.
-    """
+    """The posterior; `ratios`: (n,) or None, ρ_j, long-run over white variance of residuals, ones where not known."""
     full = FullParameters.of(structure)
     colour = np.ones(len(factors)) if ratios is None else np.sqrt(ratios)
     std = torque_rms(factors)  # from above: beside a noise of nothing every parameter looks determined
@@ -94,11 +85,7 @@ def infer(
 
 
 def _friction_doubt(structure: ModelStructure, deviation: Array, learnt: Array) -> Array:
-    """Deviation from the prior that coefficients of a kind show at the joints whose data determine them, (p,).
-
-    `deviation`: (p,), of the mean from the prior's, in its standard deviations.
-    `learnt`: (p,), share of the prior's variance that the data took away.
-    """
+    """Deviation from the prior that coefficients of a kind show at the joints whose data determine them, (p,)."""
     doubt = np.ones(structure.size)
     for name in FRICTION_COLUMNS:
         columns = [*structure.coefficients(name).values()]
@@ -130,8 +117,8 @@ def _most_probable(
 ) -> tuple[float, float, Array, Array]:
     """Width of the prior, width of highest evidence, and mean and covariance.
 
-    Friction is eliminated first: its prior does not depend on w. What is left is diagonal in the singular vectors of
-    R C, with C Cᵀ the prior covariance of the base parameters at w = 1, and every width costs a sum.
+    Friction, whose prior does not depend on w, is eliminated first; the rest is diagonal in the singular vectors of
+    R C, C Cᵀ the prior covariance of the base parameters at w = 1: every width costs a sum.
     """
     white = np.column_stack([factor @ root, target - factor @ mean])
     friction = white[:, bodies:-1]

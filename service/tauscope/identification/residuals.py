@@ -37,14 +37,10 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class ResidualStatistics:
-    """What the residuals of one parameter set tell.
-
-    `period_noise_std`: (n,) or None, standard deviation of the torque noise from what differs between periods; None
-    without enough periods.
-    """
+    """What the residuals of one parameter set tell."""
 
     fit: Fit
-    period_noise_std: Array | None
+    period_noise_std: Array | None  # (n,), of the torque noise by what differs between periods; None without enough
     raw_lags: tuple[AutocovarianceSum, ...]
     band_lags: tuple[AutocovarianceSum, ...]
     unfiltered: bool

@@ -1,7 +1,5 @@
 """The identification as a document: what ``identify --json`` writes and the REST API returns (CONTRACT.md)."""
 
-from collections.abc import Iterable
-from dataclasses import asdict
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -12,11 +10,11 @@ from tauscope.identification.identification import Identification
 from tauscope.identification.posterior import DETERMINED
 from tauscope.identification.residuals import Fit
 from tauscope.identification.warnings import identification_warnings, weak_points
-from tauscope.recording.conditioning import ConditioningSummary
+from tauscope.recording.conditioning import ConditioningEntry
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import STANDARD_PARAMETERS
 from tauscope.robot.robot_data import link_to_dict
-from tauscope.strict_model import ResultModel
+from tauscope.strict_model import ResultModel, take_fields
 
 
 class Entry(ResultModel):
@@ -132,24 +130,6 @@ class ExcitationEntry(ResultModel):
     )
 
 
-class ConditioningEntry(ResultModel):
-    """What was done to one recording, and what was missing in it."""
-
-    recording: str = Field(description="name as given")
-    samples: int = Field(description="rows in the file")
-    missed_positions: int = Field(description="rows without a complete position: bridged or split, and masked")
-    missed_torques: list[int] = Field(description="per joint, samples without a torque: masked")
-    dropped: int = Field(description="rows in pieces too short to filter")
-    gaps: int = Field(description="long gaps at which the recording was split")
-    rate_hz: float = Field(description="sampling rate [Hz]")
-    resampled: bool = Field(description="whether stamps jittered so that signals were interpolated")
-    averaged_periods: int = Field(description="periods averaged into one; 0 where none were")
-    position_noise_std: list[float] = Field(description="per joint, noise of the positions [rad or m]")
-    velocity_source: list[str] = Field(
-        description="per joint, what q̇ and q̈ were taken from: position, recorded velocity or recorded acceleration"
-    )
-
-
 class IdentificationDocument(ResultModel):
     """Result of an identification, schema tauscope.identification/1."""
 
@@ -194,17 +174,16 @@ def document(identification: Identification) -> IdentificationDocument:
     """The document of an identification."""
     result = identification
     names = [f"{name}{link + 1}" for link in range(result.robot.link_count) for name in STANDARD_PARAMETERS]
-    return IdentificationDocument(
+    return take_fields(
+        IdentificationDocument,
+        result,
         warnings=identification_warnings(result),
         robot=result.robot.name,
         joints=[joint.name for joint in result.robot.joints],
         estimator=result.options.estimator.value,
         prior=result.options.prior,
-        constrained=result.constrained,
-        cutoff_hz=result.cutoff_hz,
         noise_std=result.residuals.noise_std.tolist(),
         noise_method="periods" if result.residuals.noise_method == "periods" else "residual",
-        condition_number=result.condition_number,
         base_parameters=_base_parameters(result),
         unidentifiable=[names[column] for column in result.structure.base.unidentifiable_columns],
         undetermined=[name for name, open_ in zip(result.structure.names, result.undetermined, strict=True) if open_],
@@ -218,8 +197,6 @@ def document(identification: Identification) -> IdentificationDocument:
             price_of_bodies=result.price_of_bodies.tolist(),
         ),
         excitation=_excitation(result),
-        conditioning=_conditioning(result.conditioning),
-        held_out_conditioning=_conditioning(result.held_out_conditioning),
     )
 
 
@@ -240,17 +217,10 @@ def _base_parameters(result: Identification) -> list[BaseParameterEntry]:
             value=float(result.parameters[place]),
             std=std[place],
             independent=bool(base.is_independent(place)),
-            determined_by=_determined_by(float(learnt[place])),
+            determined_by="data" if taken >= DETERMINED else "prior" if taken <= 1.0 - DETERMINED else "both",
         )
-        for place in range(result.structure.base_count)
+        for place, taken in enumerate(learnt[: result.structure.base_count])
     ]
-
-
-def _determined_by(learnt: float) -> Literal["data", "prior", "both"]:
-    """Whose value it is, from the share of the prior's variance that the data took."""
-    if learnt >= DETERMINED:
-        return "data"
-    return "prior" if learnt <= 1.0 - DETERMINED else "both"
 
 
 def _friction(result: Identification, parameters: np.ndarray) -> list[FrictionEntry]:
@@ -266,16 +236,10 @@ def _friction(result: Identification, parameters: np.ndarray) -> list[FrictionEn
             if value is not None and (joint, name) in shape_std:
                 errors[name] = value * (shape_std[joint, name] or 0.0)
         values = {name: float(parameters[present[name]]) if name in present else 0.0 for name in columns}
-        entries.append(
-            FrictionEntry(
-                joint=result.robot.joints[joint].name,
-                **values,
-                k_v=shape.k_v,
-                delta=shape.delta,
-                std=errors,
-                identifiable={name: known[name] for name in (*_COEFFICIENTS, "k_v", "delta")},
-            )
-        )
+        told = {name: known[name] for name in (*_COEFFICIENTS, "k_v", "delta")}
+        shapes = {"k_v": shape.k_v, "delta": shape.delta}
+        name = result.robot.joints[joint].name
+        entries.append(FrictionEntry(joint=name, **values, **shapes, std=errors, identifiable=told))
     return entries
 
 
@@ -288,12 +252,7 @@ def _rotors(result: Identification) -> list[RotorEntry]:
 
 
 def _fit(fit: Fit, predicted: np.ndarray | None = None) -> FitEntry:
-    return FitEntry(
-        rms=fit.rms.tolist(),
-        band_rms=fit.band_rms.tolist(),
-        relative_error=fit.relative_error,
-        predicted_rms=None if predicted is None else predicted.tolist(),
-    )
+    return take_fields(FitEntry, fit, predicted_rms=None if predicted is None else predicted.tolist())
 
 
 def _excitation(result: Identification) -> ExcitationEntry:
@@ -308,9 +267,4 @@ def _excitation(result: Identification) -> ExcitationEntry:
         )
         for joint, each in enumerate(result.robot.joints)
     ]
-    extrapolation = None if result.extrapolation is None else result.extrapolation.tolist()
-    return ExcitationEntry(joints=joints, extrapolation=extrapolation)
-
-
-def _conditioning(summaries: Iterable[ConditioningSummary]) -> list[ConditioningEntry]:
-    return [ConditioningEntry.model_validate(asdict(each), strict=False) for each in summaries]
+    return take_fields(ExcitationEntry, result, joints=joints)

@@ -25,10 +25,7 @@ PROBE_STATES = 30
 
 
 def separable_rotors(robot: Robot, base: BaseParameters) -> tuple[bool, ...]:
-    """Joints whose rotor inertia no combination of link parameters, offsets and viscous friction can imitate.
-
-    Returns True where I_a can be told from the links.
-    """
+    """Whether no combination of link parameters, offsets and viscous friction can imitate a rotor, (n,)."""
     rng = np.random.default_rng(0)
     count = robot.joint_count
     states = [scale * rng.standard_normal((PROBE_STATES, count)) for scale in (2.0, 2.0, 4.0)]
@@ -53,12 +50,7 @@ def separable_rotors(robot: Robot, base: BaseParameters) -> tuple[bool, ...]:
 def needed_rotors(
     factors: tuple[JointFactor, ...], structure: ModelStructure, noise_std: Array, inflation: Array
 ) -> tuple[bool, ...]:
-    """Of the rotors in a model, those that the data ask for: the least needed one is dropped until all that stay count.
-
-    `noise_std`: (n,), residual standard deviation of each joint in the common band.
-    `inflation`: (n,), variance inflation by autocorrelation, at least 1.
-    Returns True where the rotor stays.
-    """
+    """Whether data ask for a rotor, (n,): the least needed drop out; `noise_std`, `inflation` of variances: (n,)."""
     joints = {joint for joint, terms in enumerate(structure.terms) if terms.rotor}
     if _gain_of_all(factors, structure, noise_std) < min(
         (_needed_gain(structure, joint, inflation[joint], factors[joint].rows) for joint in joints), default=np.inf

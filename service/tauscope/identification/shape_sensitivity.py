@@ -30,10 +30,9 @@ STEPS = 10
 def columns_with_shapes(
     prepared: PreparedMotion, structure: ModelStructure, joint: int, parameters: Array, shapes: Sequence[ShapeParameter]
 ) -> tuple[Array, NDArray[np.intp]]:
-    """A joint's columns followed by those of its estimated shape constants.
+    """A joint's columns (k, M), those of its estimated shape constants last, and their global places (k,).
 
     `parameters`: (p,), the coefficients, for the amplitudes c.
-    Returns tuple of (k, M) and (k,) int, columns in the common band, and their global places.
     """
     columns = prepared.joint_columns(structure, joint)
     index = structure.joint_columns(joint)
@@ -60,12 +59,7 @@ def refine_structure(
     shapes: Sequence[ShapeParameter],
     speed: Array,
 ) -> ModelStructure:
-    """The structure with its estimated shape constants moved to the joint optimum, by Gauss–Newton steps.
-
-    `parameters`: (p,), its coefficients.
-    `weight`: (n,), 1/σ_j of every joint.
-    `speed`: (n,), rms velocity of every joint [rad/s or m/s].
-    """
+    """The structure at its joint optimum by Gauss–Newton; `parameters`: (p,); `weight`, 1/σ_j, and `speed`: (n,)."""
     start = structure
     for _ in range(STEPS):
         gram, target = _normal_equations(motions, structure, parameters, weight, shapes)
@@ -78,17 +72,16 @@ def refine_structure(
                 moved = np.clip(moved, *gentle_range(structure.terms[joint].k_v, float(speed[joint])))
             elif abs(np.log(moved / _constant(start, joint, name))) > LARGEST_CHANGE:
                 moved = _constant(start, joint, name)
-            structure = _with_constant(structure, joint, name, float(moved))
+            terms = [*structure.terms]
+            terms[joint] = replace(terms[joint], **{name: float(moved)})
+            structure = structure.with_terms(tuple(terms))
         if np.abs(change).max() < SETTLED:
             break
     return structure
 
 
 def pseudo_inverse(matrix: Array) -> Array:
-    """Inverse (p, p) of a normal matrix in scaled columns; directions without information are left out.
-
-    `matrix`: (p, p), symmetric, positive semidefinite.
-    """
+    """Inverse (p, p) of a symmetric normal matrix in scaled columns, directions without information left out."""
     scale = np.sqrt(np.diag(matrix))
     scale[scale == 0.0] = 1.0
     values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
@@ -119,9 +112,3 @@ def _normal_equations(
 def _constant(structure: ModelStructure, joint: int, name: str) -> float:
     terms = structure.terms[joint]
     return terms.k_v if name == "k_v" else terms.delta or 0.0
-
-
-def _with_constant(structure: ModelStructure, joint: int, name: str, value: float) -> ModelStructure:
-    terms = list(structure.terms)
-    terms[joint] = replace(terms[joint], k_v=value) if name == "k_v" else replace(terms[joint], delta=value)
-    return structure.with_terms(tuple(terms))

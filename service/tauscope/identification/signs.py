@@ -5,7 +5,7 @@ masses are positive and friction takes power. So the most probable bodies are es
 all, and the signs under which they explain the torque best are found one after the other.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -27,11 +27,7 @@ FELT = 1e-3  # gravity below this share of the masses' weight at one metre, per 
 
 
 def gravity_scale(motions: Dataset, structure: ModelStructure, parameters: Array) -> float | None:
-    """Least-squares factor between the estimated torque of gravity and that of the stated links.
-
-    `parameters`: (p,), the estimate.
-    Returns 1 where both agree; None where the file states no links, or gravity does not show.
-    """
+    """Factor from stated gravity to that of `parameters`, (p,), by least squares; None where none shows."""
     links = structure.robot.model.links
     if links is None:
         return None
@@ -63,17 +59,15 @@ def reversed_joints(
     posterior: Posterior,
     consistent: ConsistentParameters,
 ) -> tuple[int, ...]:
-    """Indices of the joints whose torque explains itself much better with the other sign.
-
-    `ratios`: (n,), ρ_j, long-run over white variance of each joint's residual.
-    """
+    """Joints whose torque explains itself much better with the other sign; `ratios`: (n,), ρ_j of residuals."""
     unexplained = (posterior.noise_std > UNEXPLAINED * torque_rms(factors)) & (ratios > COLOURED)
     if not (is_rejected(consistent) or unexplained.any()):
         return ()
     signs = np.ones(structure.robot.joint_count)
     parameters = FullParameters.of(structure).map @ consistent.parameters
     while True:
-        tried = [(other, _estimate(structure, factors, ratios, other)) for other in _neighbours(signs)]
+        others = [*(signs * (1.0 - 2.0 * np.eye(len(signs)))), -signs]  # one joint turned, or all
+        tried = [(other, _estimate(structure, factors, ratios, other)) for other in others]
         other, best = max(tried, key=lambda each: _log_likelihood(factors, ratios, *each))
         # Beside a wrong sign the residual is as coloured as the motion: the whiter hypothesis tells the noise.
         left = evaluate(motions, structure, [best, -best])
@@ -84,12 +78,6 @@ def reversed_joints(
             return tuple(int(joint) for joint in np.flatnonzero(signs < 0.0))
         signs, ratios = other, colour
         parameters = _estimate(structure, factors, ratios, signs)
-
-
-def _neighbours(signs: Array) -> Iterator[Array]:
-    for joint in range(len(signs)):
-        yield np.where(np.arange(len(signs)) == joint, -signs, signs)
-    yield -signs
 
 
 def _estimate(structure: ModelStructure, factors: tuple[JointFactor, ...], ratios: Array, signs: Array) -> Array:

@@ -75,11 +75,7 @@ class ModelStructure:
         return np.concatenate([np.arange(self.base_count)[self.base.outward(joint)], own])
 
     def joint_term_columns(self, joint: int, velocity: Array, acceleration: Array) -> Array:
-        """The joint's own columns along a motion.
-
-        `velocity`, `acceleration`: (N,), of this joint [rad/s or m/s, and per s].
-        Returns (k, N), in the order of `JointTerms.names`.
-        """
+        """Columns (k, N) in the order of `JointTerms.names`; `velocity`, `acceleration`: (N,)."""
         terms = self.terms[joint]
         rows = {
             "stiction": lambda: smooth_sign(velocity, terms.k_v),

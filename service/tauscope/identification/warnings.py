@@ -6,7 +6,7 @@ from tauscope.identification.consistency import far_reaching
 from tauscope.identification.excitation import Excitation
 from tauscope.identification.identification import Identification
 from tauscope.identification.posterior import DETERMINED
-from tauscope.recording.conditioning import ConditioningSummary
+from tauscope.recording.conditioning import ConditioningEntry
 from tauscope.result_warning import ResultWarning
 from tauscope.robot import Robot
 from tauscope.robot.messages import listed
@@ -61,17 +61,12 @@ def weak_points(result: Identification, joint: int) -> list[str]:
     weak = [text for name, text in _FRICTION.items() if not known.get(name, True)]
     if result.excitation.reversals[joint] < FEWEST_REVERSALS:
         weak.append(f"reversals: {result.excitation.reversals[joint]}; move it to and fro")
-    open_ = [name for name, learnt in _own_bodies(result, joint) if learnt < DETERMINED]
+    base, learnt = result.structure.base, result.posterior.learnt
+    own = [place for place, column in enumerate(base.independent_columns) if column // 10 == joint]
+    open_ = [base.names[place] for place in own if learnt[place] < DETERMINED]
     if open_:
         weak.append(f"{listed(open_)}; move it faster together with the joints before it, in more postures")
     return weak
-
-
-def _own_bodies(result: Identification, joint: int) -> Iterator[tuple[str, float]]:
-    base = result.structure.base
-    for place, column in enumerate(base.independent_columns):
-        if column // 10 == joint:
-            yield base.names[place], float(result.posterior.learnt[place])
 
 
 def _signs(result: Identification) -> Iterator[ResultWarning]:
@@ -166,7 +161,7 @@ def extrapolation_warnings(result: Identification) -> Iterator[ResultWarning]:
         )
 
 
-def _samples(summaries: tuple[ConditioningSummary, ...]) -> Iterator[ResultWarning]:
+def _samples(summaries: tuple[ConditioningEntry, ...]) -> Iterator[ResultWarning]:
     for each in summaries:
         counts = {
             "without a position": each.missed_positions,

@@ -2,7 +2,7 @@
 
 from tauscope.recording.checks import RecordingReport, check_recording, report_recording
 from tauscope.recording.convert import convert_recording, write_recording
-from tauscope.recording.examination import examine_recording, open_recording
+from tauscope.recording.examination.examine import examine_recording, open_recording
 from tauscope.recording.layout.guess import flow_text
 from tauscope.recording.reading import ColumnMapping, find_mapping, read_recording
 from tauscope.recording.recording import EffortKind, Recording, Samples

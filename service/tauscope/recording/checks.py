@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from pydantic import Field, PlainSerializer
 
 from tauscope.errors import RecordingError
-from tauscope.recording.examination import find_implausible, find_missing_effort, mend_recording
+from tauscope.number_text import counted
+from tauscope.recording.examination.examine import find_missing_effort, mend_recording
+from tauscope.recording.examination.plausibility import find_implausible
 from tauscope.recording.reading import read_recording
 from tauscope.recording.recording import Array, EffortKind, Recording, Samples
 from tauscope.recording.units import SI, Reading
@@ -28,8 +30,8 @@ _STEP_SAMPLES = 30
 _CLIPPED_RUN = 5
 _CLIPPED_SHARE = 0.005
 _CLIPPED_SAMPLES = 10
+# A number; NaN, which JSON does not know, is null there: nothing was measured.
 Measured = Annotated[float, PlainSerializer(lambda value: None if math.isnan(value) else value, float | None)]
-"""A number; NaN, which JSON does not know, is null there: nothing was measured."""
 
 
 @entry
@@ -94,13 +96,8 @@ class _Running:
 def measure_rows(recording: Recording) -> RowMeasures:
     """Take every figure that needs no other figure first, and then the clipped samples."""
     n, columns = recording.joint_count, len(recording.table.names)
-    running = _Running(
-        least=np.full(columns, np.inf),
-        greatest=np.full(columns, -np.inf),
-        missed=np.zeros(columns, dtype=np.int64),
-        wraps=np.zeros(n, dtype=np.int64),
-        first_wrap=np.full(n, np.nan),
-    )
+    least, greatest, missed = np.full(columns, np.inf), np.full(columns, -np.inf), np.zeros(columns, dtype=np.int64)
+    running = _Running(least, greatest, missed, np.zeros(n, dtype=np.int64), np.full(n, np.nan))
     stride = max(1, -(-len(recording) // _KEPT_STEPS))
     for start in range(0, len(recording), _ROWS_AT_ONCE):
         # One sample more than the block, so that the steps between blocks are seen too.
@@ -239,10 +236,7 @@ class RecordingReport:
     findings: tuple[Finding, ...] = Field(description="warnings first")
 
     def require_usable(self) -> None:
-        """Refuse a recording that no other verb accepts.
-
-        Raises RecordingError where a column can hardly be in its unit, or a joint has no effort.
-        """
+        """Raise RecordingError where a column can hardly be in its unit, or a joint has no effort."""
         for finding in self.findings:
             if finding.severity is Severity.ERROR:
                 raise RecordingError(f"{self.name}: column {finding.where}: {finding.text}")
@@ -251,12 +245,7 @@ class RecordingReport:
 def check_recording(
     path: str | Path, joint_count: int | None = None, robot: Robot | None = None, reading: Reading = SI
 ) -> RecordingReport:
-    """Read a recording and report what it holds, in memory that does not grow with its length.
-
-    Raises RecordingError where the file cannot be read or breaks a rule.
-
-    `joint_count`: joints that the recording must have; None where any number is welcome.
-    """
+    """Read a recording and report on it in bounded memory. Raises RecordingError where it breaks a rule."""
     reading = reading.for_robot(robot)
     joints = None if robot is None else [joint.name for joint in robot.joints]
     recording = read_recording(path, joint_count, joints, reading)
@@ -270,10 +259,12 @@ def report_recording(recording: Recording, robot: Robot | None = None, *, trust_
     runs = measures.period_lengths
     findings = [*_about_units(recording, robot, trust_units=trust_units)]
     findings += [_locate(Severity.WARNING, note.text) for note in mend_recording(recording, robot).notes]
-    findings += [*_about_columns(recording), *_about_clock(gaps)]
-    for name, count in measures.missed.items():
-        text = "1 sample missed (NaN)" if count == 1 else f"{count} samples missed (NaN)"
-        findings += [Finding(Severity.INFO, name, text)] if name != "period" else []
+    findings += _about_columns(recording)
+    if gaps.count:
+        longest = f"the longest, {gaps.longest:.4g} s, begins at t = {gaps.longest_at:.6g} s"
+        findings.append(Finding(Severity.WARNING, "t", f"{counted(gaps.count, 'gap')} in the clock; {longest}"))
+    missed = {name: counted(count, "sample") for name, count in measures.missed.items() if name != "period"}
+    findings += [Finding(Severity.INFO, name, f"{text} missed (NaN)") for name, text in missed.items()]
     for joint, measure in enumerate(measures.joints, 1):
         findings += _about_position(f"q{joint}", measure)
         if recording.effort_kind is EffortKind.COMMAND:  # a target may rest
@@ -321,13 +312,6 @@ def _about_columns(recording: Recording) -> Iterator[Finding]:
         yield Finding(Severity.INFO, ", ".join(passed_over), "currents are not read where torques are there")
     if others:
         yield Finding(Severity.INFO, listed(others), "not read: no column of this name is known")
-
-
-def _about_clock(gaps: Gaps) -> Iterator[Finding]:
-    if gaps.count:
-        places = "1 gap" if gaps.count == 1 else f"{gaps.count} gaps"
-        longest = f"the longest, {gaps.longest:.4g} s, begins at t = {gaps.longest_at:.6g} s"
-        yield Finding(Severity.WARNING, "t", f"{places} in the clock; {longest}")
 
 
 def _about_position(q: str, measure: JointMeasures) -> Iterator[Finding]:

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from tauscope.errors import RecordingError, RecordingMismatchError
+from tauscope.number_text import counted
 from tauscope.recording.layout.families import BY_NAME, role_of, words_of
 from tauscope.recording.layout.guess import guess_layout, is_numbered, layout_text
 from tauscope.recording.layout.presets import PRESET_OF
@@ -49,10 +50,9 @@ def is_column(name: str) -> bool:
 
 
 def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLayout:
-    """Find the columns of CONTRACT.md in a file's header, as its mapping, its preset or their own names say.
+    """Columns of CONTRACT.md in a file's header, by its mapping, its preset or their own names.
 
-    Raises RecordingError where a column is missing; the message holds the mapping that the header suggests. Raises
-    RecordingMismatchError where the file names other joints than the robot.
+    Raises RecordingError, which holds the mapping that the header suggests; RecordingMismatchError for other joints.
     """
     renamed = rename_columns(header, reading, file)
     counts_rows = reading.units.get("t") == "index" and "t" not in renamed
@@ -64,11 +64,10 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
         if reading.columns is not None or isinstance(error, RecordingMismatchError) or len(set(named)) < len(named):
             raise
         guess = suggest_layout(header, reading, file)
-        if guess is None and _is_ours(header):
-            raise
         if guess is None:
+            if _is_ours(header):
+                raise
             _require_known_names(header, reading, file)
-        if guess is None:
             raise RecordingError(f"{error}; `tauscope recording map` maps columns of other names") from error
         text = (
             f"{file}: the first row holds numbers where the column names are expected" if is_numbered(header) else error
@@ -123,28 +122,16 @@ def _note_command(header: Sequence[str], renamed: Sequence[str]) -> tuple[Result
 
 def find_layout(header: Sequence[str], reading: Reading, file: str) -> tuple[Reading, ColumnLayout]:
     """How a file is read, and which of its columns is which. Raises RecordingError as `map_columns`."""
-    reading = _choose_reading(header, reading, file)
+    if reading.is_usual and _is_ours(header):  # Tauscope made it, and the robot file describes those of another tool
+        try:
+            rename_columns(header, reading, file)
+        except RecordingError:
+            reading = replace(reading, columns=None, units={}, rate_hz=None)
     return reading, map_columns(header, reading, file)
 
 
-def _choose_reading(header: Sequence[str], reading: Reading, file: str) -> Reading:
-    """The reading of a file: in SI where Tauscope made it, and the robot file describes those of another tool."""
-    if not (reading.is_usual and _is_ours(header)):
-        return reading
-    try:
-        rename_columns(header, reading, file)
-    except RecordingError:
-        return replace(reading, columns=None, units={}, rate_hz=None)
-    return reading
-
-
 def find_columns(header: Sequence[str], file: str, *, counts_rows: bool = False) -> ColumnLayout:
-    """Find the columns of CONTRACT.md in a header.
-
-    Raises RecordingError where a required column is missing, a name appears twice, a joint's number leaves a gap.
-
-    `counts_rows`: whether t is the number of the row, and the header's first name is no column of the file.
-    """
+    """Columns of CONTRACT.md in a header; `counts_rows`: its first name is no column. Raises RecordingError."""
     where = _positions(header, file)
     if "t" not in where:
         raise RecordingError(f"{file}: column t (time in seconds) is missing; the columns are {listed(header)}")
@@ -171,17 +158,12 @@ def find_columns(header: Sequence[str], file: str, *, counts_rows: bool = False)
 
 
 def require_joint_count(found: int, expected: int | None, file: str) -> None:
-    """Refuse a recording of another robot.
-
-    Raises RecordingMismatchError where the numbers differ.
-
-    `expected`: joints of the robot; None where any number is welcome.
-    """
+    """Refuse a recording of another robot. Raises RecordingMismatchError."""
     if expected is None or found == expected:
         return
     fault = f"column q{found + 1} is missing" if found < expected else f"column q{expected + 1} belongs to no joint"
     raise RecordingMismatchError(
-        f"{file}: the recording has {_joints(found)}, the robot has {_joints(expected)}: {fault}; "
+        f"{file}: the recording has {counted(found, 'joint')}, the robot has {counted(expected, 'joint')}: {fault}; "
         "give the robot file and the recording of the same arm"
     )
 
@@ -190,7 +172,7 @@ def _positions(header: Sequence[str], file: str) -> dict[str, int]:
     """Index of every named column; unnamed ones (pandas writes its index so) are nobody's."""
     where: dict[str, int] = {}
     for index, name in enumerate(header):
-        if name and name in where:
+        if name in where:
             raise RecordingError(
                 f"{file}: column {printable(name)} appears twice (as columns {where[name] + 1} and {index + 1}); "
                 "rename or delete one"
@@ -238,7 +220,3 @@ def _order_names(
                 )
             names.append(f"{group}{joint}")
     return (*names, "period") if "period" in where else tuple(names)
-
-
-def _joints(count: int) -> str:
-    return f"{count} joint" if count == 1 else f"{count} joints"

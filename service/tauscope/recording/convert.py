@@ -8,14 +8,14 @@ from typing import BinaryIO
 import numpy as np
 from mcap_ros2.writer import Writer
 
-from tauscope.errors import RecordingError
+from tauscope.errors import RecordingError, explain_os_errors
 from tauscope.files import open_atomically
+from tauscope.recording.column_files import write_parquet
 from tauscope.recording.csv_format import write_csv
 from tauscope.recording.intake import Choice
 from tauscope.recording.joint_state import JOINT_STATE_DEFINITION
 from tauscope.recording.joint_state_decoders import JOINT_STATE_TYPES
 from tauscope.recording.mcap_format import MCAP_MAGIC, recover_mcap
-from tauscope.recording.parquet_format import write_parquet
 from tauscope.recording.reading import first_bytes, read_recording
 from tauscope.recording.recording import Array, EffortKind, Recording
 from tauscope.recording.units import SI, Reading
@@ -26,10 +26,7 @@ _LATEST_STAMP_S = 2.0**31
 
 
 def write_mcap(recording: Recording, file: BinaryIO, joint_names: Sequence[str] | None = None) -> tuple[str, ...]:
-    """Write a recording as ``/joint_states`` of type sensor_msgs/msg/JointState.
-
-    Raises RecordingError where efforts are currents, or times cannot be kept as nanoseconds.
-    """
+    """Write ``/joint_states``. Raises RecordingError for currents, and for times that are no nanoseconds."""
     if recording.effort_kind is not EffortKind.TORQUE:
         raise RecordingError(f"{recording.name}: JointState holds torques and this recording currents (i1…); use .csv")
     n = recording.joint_count
@@ -91,11 +88,9 @@ def convert_recording(
     robot: Robot | None = None,
     reading: Reading = SI,
 ) -> Conversion:
-    """Write a recording, in SI, in the format that the target's suffix names.
+    """Write a recording, in SI, as the target's suffix says; MCAP holds whole nanoseconds, q, τ and q̇ only.
 
-    MCAP holds time from the first sample on in whole nanoseconds, positions, torques and velocities; CSV and Parquet
-    hold every column exactly. Raises RecordingError where the source cannot be read, or the target cannot hold it or
-    exists.
+    Raises RecordingError where the source cannot be read, or the target cannot hold it or exists.
     """
     source_path, target_path = Path(source), Path(target)
     _require_other(source_path, target_path)
@@ -110,20 +105,14 @@ def convert_recording(
 def write_recording(
     recording: Recording, path: str | Path, *, joint_names: Sequence[str] | None = None, overwrite: bool = False
 ) -> tuple[str, ...]:
-    """Write a recording; the file appears under its name only when it is complete.
-
-    Raises RecordingError where the file exists or cannot be written, or its suffix names no format.
-    """
+    """Write a recording, whole or not at all. Raises RecordingError where the target exists or is no format."""
     path = Path(path)
     _require_writable(path, overwrite=overwrite)
-    try:
-        with open_atomically(path) as file:
-            if path.suffix.lower() == ".mcap":
-                return write_mcap(recording, file, joint_names)
-            (write_parquet if path.suffix.lower() == ".parquet" else write_csv)(recording, file)
-            return ()
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be written ({error.strerror or error})") from error
+    with explain_os_errors(RecordingError, f"{path}: cannot be written"), open_atomically(path) as file:
+        if path.suffix.lower() == ".mcap":
+            return write_mcap(recording, file, joint_names)
+        (write_parquet if path.suffix.lower() == ".parquet" else write_csv)(recording, file)
+        return ()
 
 
 def _read(

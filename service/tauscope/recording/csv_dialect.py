@@ -27,11 +27,7 @@ _SHOWN_CHARACTERS = 40
 
 
 def parse_quickly(text: bytes, delimiter: bytes, width: int, source: Sequence[int]) -> Array | None:
-    """Parse a block of complete lines, or decline.
-
-    Returns (rows, len(source)) or None, None where a line is not exactly `width` decimal numbers, NaN or empty fields:
-    comments, text, anything unusual.
-    """
+    """Parse a block of complete lines to (rows, len(source)); None where a line holds anything but `width` numbers."""
     if b"\r" in text:
         text = text.replace(b"\r\n", b"\n")
     if delimiter != b",":
@@ -75,12 +71,7 @@ def _parse_numbers(text: bytes) -> Array | None:
 
 
 def parse_number(field: bytes, file: str, line: int, column: str) -> float:
-    """Parse one field strictly: a decimal number, or NaN where it is empty or ``nan``.
-
-    Raises RecordingError where the text is not a number, or is infinite.
-
-    `line`: its line, counted from 1.
-    """
+    """A decimal number, NaN where the field is empty or ``nan``. Raises RecordingError for anything else."""
     text = field.strip(b" \t")
     if not text or _MISSED.fullmatch(text):
         return np.nan
@@ -99,13 +90,7 @@ class Clock:
         self._first: datetime | None = None
 
     def parse(self, field: bytes, file: str, line: int) -> float:
-        """Time of a row.
-
-        Raises RecordingError where the text is neither a number nor a date.
-
-        `line`: its line, counted from 1.
-        Returns float: [s], or in the file's own unit.
-        """
+        """Time of a row, in the file's own unit. Raises RecordingError where it is neither a number nor a date."""
         text = field.strip(b' \t"')
         if not _DATE.match(text):
             return parse_number(field, file, line, "t")
@@ -156,10 +141,7 @@ _FREE = ("temp", "period")  # groups whose units are not looked at
 
 
 def read_units_row(names: Sequence[str], cells: Sequence[str]) -> dict[str, str] | None:
-    """Units as a robot file states them, None where a cell holds no unit of its column.
-
-    `names`: columns of CONTRACT.md; `cells`: cells of the row, one for each of them.
-    """
+    """Units by column of CONTRACT.md, as a robot file states them; None where a cell holds no unit of its column."""
     units: dict[str, str] = {}
     for name, cell in zip(names, cells, strict=True):
         group = name.rstrip("0123456789")
@@ -266,10 +248,7 @@ def _elements(cell: str) -> list[str]:
 
 
 def find_first_row(lines: Sequence[bytes], sign: bytes | None) -> tuple[int, Dialect] | None:
-    """The first line of numbers and its dialect; None where there is none.
-
-    `sign`: delimiter, None where the lines show it.
-    """
+    """The first line of numbers and its dialect, by `sign` or as the lines show it; None where there is none."""
     for index, line in enumerate(lines):
         if line.strip().startswith(b"#"):
             continue

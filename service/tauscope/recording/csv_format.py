@@ -9,19 +9,9 @@ from typing import BinaryIO
 import numpy as np
 
 from tauscope.errors import RecordingError
+from tauscope.number_text import counted
+from tauscope.recording import csv_dialect
 from tauscope.recording.columns import ColumnLayout, find_layout, require_joint_count
-from tauscope.recording.csv_dialect import (
-    BLANK,
-    Clock,
-    Dialect,
-    find_delimiter,
-    find_first_row,
-    is_number,
-    parse_number,
-    parse_quickly,
-    read_units_row,
-    shown,
-)
 from tauscope.recording.intake import Choice, RowIntake, SplitClock
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.units import SI, Reading
@@ -34,11 +24,9 @@ _SAMPLE_BYTES = 2**16
 
 
 def read_csv(path: Path, choice: Choice) -> Recording:
-    """Read a CSV recording, in time linear and in memory bounded in its number of lines.
+    """Read a CSV in time linear and in memory bounded in its lines; an empty field or ``nan`` is a missed sample.
 
-    Comma, semicolon, tab, | or blanks between the fields; an empty field or ``nan`` is a missed sample. Raises
-    RecordingError, which names the line and column at fault. Raises RecordingMismatchError where the file has another
-    number of joints.
+    Raises RecordingError, which names line and column, and RecordingMismatchError for another number of joints.
     """
     name = choice.file
     with path.open("rb") as file:
@@ -59,10 +47,7 @@ def read_csv(path: Path, choice: Choice) -> Recording:
 
 
 def read_csv_header(path: Path, name: str) -> list[str]:
-    """Names of a file's columns, or numbers from 1 where it has none.
-
-    Raises RecordingError where the file holds no line of text.
-    """
+    """Names of a file's columns, or numbers from 1. Raises RecordingError where it holds no line of text."""
     with path.open("rb") as file:
         return _read_names(file, name, SI).names
 
@@ -82,7 +67,7 @@ class _Names:
     """The line before the first row, how fields are separated, and names of the columns."""
 
     line: int
-    dialect: Dialect
+    dialect: csv_dialect.Dialect
     names: list[str]
 
 
@@ -91,10 +76,10 @@ class _Header:
     """The line before the first row, how fields are separated, and which column is which."""
 
     line: int
-    dialect: Dialect
+    dialect: csv_dialect.Dialect
     layout: ColumnLayout
     reading: Reading
-    clock: Clock
+    clock: csv_dialect.Clock
     split: SplitClock
 
 
@@ -119,13 +104,13 @@ def _read_header(file: BinaryIO, name: str, reading: Reading) -> _Header:
         number = found.line
     else:  # stated units override it
         reading = replace(reading, units={**units, **reading.units})
-    return _Header(number, found.dialect, layout, reading, Clock(), SplitClock())
+    return _Header(number, found.dialect, layout, reading, csv_dialect.Clock(), SplitClock())
 
 
 def _find_units(cells: Sequence[bytes], layout: ColumnLayout) -> dict[str, str] | None:
-    if len(cells) != layout.width or any(map(is_number, cells)):
+    if len(cells) != layout.width or any(map(csv_dialect.is_number, cells)):
         return None
-    return read_units_row(layout.names, [_decode(cells[index]) for index in layout.source])
+    return csv_dialect.read_units_row(layout.names, [_decode(cells[index]) for index in layout.source])
 
 
 def _read_names(file: BinaryIO, name: str, reading: Reading) -> _Names:
@@ -137,9 +122,7 @@ def _read_names(file: BinaryIO, name: str, reading: Reading) -> _Names:
         if number == 1:
             line = line.removeprefix(_BYTE_ORDER_MARK)
         if len(line) == _LONGEST_LINE_BYTES:
-            raise RecordingError(
-                f"{name}: line {number} has more than {_LONGEST_LINE_BYTES} characters: is this a CSV file?"
-            )
+            raise _line_error(name, number)
         _require_text(line, number, name)
         if not _is_empty(line):
             return _parse_names(file, line.strip(b"\r\n"), number, at, comment, name, reading)
@@ -158,11 +141,14 @@ def _parse_names(
     start = file.tell()
     raw = file.read(_SAMPLE_BYTES).split(b"\n")[:-1]
     sample = [line, *(each.strip(b"\r") for each in raw)]
-    first, dialect = find_first_row(sample, sign) or (1, Dialect(sign or find_delimiter(line)))
+    first, dialect = csv_dialect.find_first_row(sample, sign) or (
+        1,
+        csv_dialect.Dialect(sign or csv_dialect.find_delimiter(line)),
+    )
     row = sample[first] if first < len(sample) else b""
     named = _find_header(sample[:first], row, dialect)
     if named is None and first:  # the lines differ: the first one says how they are meant
-        dialect = Dialect(sign or find_delimiter(line))
+        dialect = csv_dialect.Dialect(sign or csv_dialect.find_delimiter(line))
     has_comma = dialect.shows_decimal_comma(sample[first:]) if reading.decimal is None else reading.decimal == ","
     rows = replace(dialect, has_decimal_comma=has_comma)
     if first == 0:
@@ -182,18 +168,16 @@ def _parse_names(
     return _Names(number, rows, [_decode(field) for field in fields])
 
 
-def _find_header(lines: Sequence[bytes], row: bytes, dialect: Dialect) -> int | None:
+def _find_header(lines: Sequence[bytes], row: bytes, dialect: csv_dialect.Dialect) -> int | None:
     """The first line with as many names as the row has fields; lines before it say something else."""
     cells = len(dialect.split(row))
-    for index, line in enumerate(lines):
-        if not _is_empty(line) and len(dialect.name_fields(line, row)) == cells:
-            return index
-    return None
+    named = (not _is_empty(line) and len(dialect.name_fields(line, row)) == cells for line in lines)
+    return next((index for index, is_header in enumerate(named) if is_header), None)
 
 
-def _name_numbers(comment: bytes, row: Sequence[bytes], dialect: Dialect) -> list[bytes]:
+def _name_numbers(comment: bytes, row: Sequence[bytes], dialect: csv_dialect.Dialect) -> list[bytes]:
     """Names in the comment before a row, where it has as many; else numbers from 1."""
-    for sign in (dialect, Dialect(BLANK)):
+    for sign in (dialect, csv_dialect.Dialect(csv_dialect.BLANK)):
         if comment and len(names := sign.split(comment)) == len(row):
             return names
     return [b"%d" % column for column in range(1, len(row) + 1)]
@@ -213,9 +197,7 @@ def _chunks(file: BinaryIO, line: int, name: str) -> Iterator[_Chunk]:
         if end == 0:
             rest += data
             if len(rest) > _LONGEST_LINE_BYTES:
-                raise RecordingError(
-                    f"{name}: line {line} has more than {_LONGEST_LINE_BYTES} characters: is this a CSV file?"
-                )
+                raise _line_error(name, line)
             continue
         text = rest + data[:end]
         rest = data[end:]
@@ -229,7 +211,7 @@ def _parse_chunk(chunk: _Chunk, header: _Header, name: str, *, is_first: bool) -
     layout = header.layout
     source = layout.source if layout.nanoseconds is None else (*layout.source, layout.nanoseconds)
     normal = header.dialect.normalize(chunk.text)
-    block = parse_quickly(normal, header.dialect.separator, layout.width, source)
+    block = csv_dialect.parse_quickly(normal, header.dialect.separator, layout.width, source)
     if block is not None:
         return _join_time(block, header), range(chunk.first_line, chunk.first_line + len(block))
     rows: list[list[float]] = []
@@ -244,7 +226,7 @@ def _parse_chunk(chunk: _Chunk, header: _Header, name: str, *, is_first: bool) -
         if is_first and not rows:
             _refuse_units(fields, number, header, name)
         time, *others = zip((*layout.names, "t"), source, strict=False)
-        row = [parse_number(fields[index], name, number, column) for column, index in others]
+        row = [csv_dialect.parse_number(fields[index], name, number, column) for column, index in others]
         rows.append([header.clock.parse(fields[time[1]], name, number), *row])
         lines.append(number)
     return _join_time(np.array(rows, dtype=np.float64).reshape(len(rows), len(source)), header), lines
@@ -268,22 +250,27 @@ def _split_line(line: bytes, number: int, header: _Header, name: str, *, is_trun
         hint = ": the last line is truncated; delete it or copy the file again"
     elif header.dialect.delimiter == b"," and len(fields) > width and b";" in line:
         hint = "; separate all lines alike"
-    elif header.dialect.delimiter == b"," and len(fields) >= 2 * width - 1 and all(map(is_number, fields)):
+    elif header.dialect.delimiter == b"," and len(fields) >= 2 * width - 1 and all(map(csv_dialect.is_number, fields)):
         hint = ": are these decimal commas? write decimals with a point"
     else:
         hint = "; complete or delete the line"
-    found = "1 field" if len(fields) == 1 else f"{len(fields)} fields"
-    raise RecordingError(f"{name}: line {number} has {found} where the header has {width} columns{hint}")
+    raise RecordingError(
+        f"{name}: line {number} has {counted(len(fields), 'field')} where the header has {width} columns{hint}"
+    )
 
 
 def _refuse_units(fields: Sequence[bytes], number: int, header: _Header, name: str) -> None:
     """A first line without a single number is most likely a row of units."""
     wanted = [fields[index].strip(b' \t"') for index in header.layout.source]
-    if any(wanted) and not any(is_number(field) or field.lower() == b"nan" for field in wanted):
-        text = shown(b",".join(fields).strip())
+    if any(wanted) and not any(csv_dialect.is_number(field) or field.lower() == b"nan" for field in wanted):
+        text = csv_dialect.shown(b",".join(fields).strip())
         raise RecordingError(
             f"{name}: line {number} looks like a row of units ({text}); delete it or start it with '#'"
         )
+
+
+def _line_error(name: str, number: int) -> RecordingError:
+    return RecordingError(f"{name}: line {number} has more than {_LONGEST_LINE_BYTES} characters: is this a CSV file?")
 
 
 def _require_text(line: bytes, number: int, name: str) -> None:

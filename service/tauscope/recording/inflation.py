@@ -18,10 +18,7 @@ HELD_BYTES = 2**25  # unpacked size that is never refused of data that are held 
 def require_plausible_inflation(
     packed_bytes: int, unpacked_bytes: int, name: str, accepted_bytes: int | None = None
 ) -> None:
-    """Refuse a file that unpacks to more than `LARGEST_RATIO` times its size, beyond a size that does no harm.
-
-    Raises RecordingError if it does.
-    """
+    """Raise RecordingError beyond `LARGEST_RATIO` times the packed size and a size that does no harm."""
     accepted_bytes = ALWAYS_ACCEPTED_BYTES if accepted_bytes is None else accepted_bytes
     if unpacked_bytes > max(accepted_bytes, LARGEST_RATIO * packed_bytes):
         ratio = unpacked_bytes // max(packed_bytes, 1)
@@ -44,10 +41,7 @@ _COPY_BYTES = 2**20
 
 
 def decompress_message(message: bytes) -> bytes:
-    """The message itself, where it is compressed.
-
-    Raises ValueError where the frame is damaged, or larger than any joint state.
-    """
+    """The message, unpacked. Raises ValueError where it is damaged, or larger than any joint state."""
     if not message.startswith(ZSTD_MAGIC):
         return message
     try:
@@ -59,10 +53,7 @@ def decompress_message(message: bytes) -> bytes:
 
 
 def decompress_file(source: Path, target: Path, name: str) -> Path:
-    """Write a compressed file's content to a target, which is returned.
-
-    Raises RecordingError where the file is damaged, or holds implausibly much.
-    """
+    """Unpack a file to a target, and return it. Raises RecordingError where it is damaged or implausibly large."""
     size, written = source.stat().st_size, 0
     try:
         with source.open("rb") as packed, target.open("wb") as plain:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.errors import RecordingError
+from tauscope.number_text import counted
 from tauscope.recording.recording import Recording
 from tauscope.recording.samples import Array, EffortKind, RowCheck, require_rising, require_rows
 from tauscope.recording.table import SPOOL_ABOVE_BYTES, TableBuilder
@@ -36,10 +37,7 @@ class SplitClock:
         self._first = np.nan
 
     def join(self, seconds: Array, nanoseconds: Array) -> Array:
-        """Time since the first second.
-
-        `seconds`, `nanoseconds`: (rows,), parts of each stamp [s, ns]. Returns (rows,) [s].
-        """
+        """Time since the first second, (rows,) [s], of `seconds` and `nanoseconds`, (rows,)."""
         if len(seconds) and np.isnan(self._first):
             self._first = seconds[0]
         return (seconds - self._first) + 1e-9 * nanoseconds
@@ -55,11 +53,7 @@ class EpisodeClock:
         self._count = 0
 
     def shift(self, time: Array, episode: Array) -> Array:
-        """Time on the common clock.
-
-        `time`: (rows,), of each row within its episode, in the file's unit; `episode`: (rows,), index of its episode.
-        Returns (rows,), in the file's unit.
-        """
+        """The common clock, (rows,), in the file's unit; `time`: (rows,), within each `episode`, (rows,) of indices."""
         starts = np.flatnonzero(np.diff(episode, prepend=self._episode) != 0)
         shifted = time + self._shift
         for start in starts:
@@ -109,12 +103,7 @@ class RowIntake:
         return self._rows
 
     def add(self, block: Array, place: Callable[[int], str]) -> None:
-        """Take the next block.
-
-        Raises RecordingError, which names the row and the column at fault.
-
-        `block`: (rows, columns), as the file has them.
-        """
+        """Take the next (rows, columns) `block`. Raises RecordingError, which names row and column."""
         self._check(block, place)
         rows = np.append(self._tail_rows, np.arange(self._rows, self._rows + len(block)))
         self._rows += len(block)
@@ -133,10 +122,7 @@ class RowIntake:
     def finish(
         self, joint_count: int, ignored: tuple[str, ...] = (), notes: tuple[ResultWarning, ...] = ()
     ) -> Recording:
-        """The recording of all rows.
-
-        Raises RecordingError where there is next to none, or too many have the same stamp.
-        """
+        """The recording of all rows. Raises RecordingError where there are too few, or too many have one stamp."""
         self._builder.append(self._tail)
         require_rows(len(self._builder), self._file)
         if self._repeated > max(LATE_ROWS, REPEATED_SHARE * self._rows):
@@ -182,8 +168,8 @@ class RowIntake:
     def _warnings(self) -> Sequence[ResultWarning]:
         found = []
         if self._late:
-            rows = "1 row came" if self._late == 1 else f"{self._late} rows came"
-            text = f"{rows} after a later one, first at t = {self._first_late:.6g} s; put in order of time"
+            rows = counted(self._late, "row")
+            text = f"{rows} came after a later one, first at t = {self._first_late:.6g} s; put in order of time"
             found.append((text, "record with one publisher, or sort the file by t"))
         if self._repeated:
             rows = "1 row has" if self._repeated == 1 else f"{self._repeated} rows have"

@@ -53,10 +53,7 @@ class JointParts:
 
 
 def merge_parts(topics: Sequence[JointParts], wanted: Sequence[str], choice: Choice) -> Recording | None:
-    """The recording at the instants of the joint with fewest positions, the others interpolated to them.
-
-    Rows within a gap of a joint are NaN there. Returns None where a joint has no positions or no efforts.
-    """
+    """The recording at the instants of the slowest joint, NaN in gaps; None where a joint lacks position or effort."""
     of_joint = [next((topic for topic in topics if topic.is_whole(joint)), None) for joint in wanted]
     used = [topic for topic in topics if topic in of_joint]
     sources = [(topic, joint) for topic, joint in zip(of_joint, wanted, strict=True) if topic is not None]

@@ -26,11 +26,7 @@ _NANOSECONDS = 1_000_000_000
 
 @dataclass(frozen=True, eq=False)
 class JointState:
-    """One message.
-
-    `stamp`: time of measurement [ns].
-    `position`, `velocity`, `effort`: (n,), empty where the publisher does not know them.
-    """
+    """One message; `position`, `velocity`, `effort`: (n,), empty where the publisher does not know them."""
 
     stamp: int
     names: tuple[str, ...]
@@ -41,15 +37,11 @@ class JointState:
 
 @dataclass(frozen=True, eq=False)
 class JointStates:
-    """Messages of one layout.
+    """Messages of one layout, one row a message."""
 
-    `stamp`: (N,) int64, time of measurement [ns].
-    `position`, `velocity`, `effort`: (N, n) or (N, 0), one row a message.
-    """
-
-    stamp: NDArray[np.int64]
+    stamp: NDArray[np.int64]  # (N,) int64, time of measurement [ns]
     names: tuple[str, ...]
-    position: Array
+    position: Array  # (N, n) or (N, 0), as are velocity and effort
     velocity: Array
     effort: Array
 
@@ -71,10 +63,7 @@ class JointStateLayout:
         self._fixed = np.frombuffer(message, np.uint8)[self._fixed_at]
 
     def decode(self, messages: Sequence[bytes]) -> JointStates | None:
-        """Decode a batch at once, or decline.
-
-        Returns JointStates or None: None where one of the messages has another layout.
-        """
+        """Decode a batch at once; None where one of the messages has another layout."""
         if any(len(message) != self._size for message in messages):
             return None
         raw = np.frombuffer(b"".join(messages), np.uint8).reshape(len(messages), self._size)
@@ -97,10 +86,7 @@ def decode_cdr(message: bytes) -> JointState:
 
 
 def decode_json(message: bytes) -> JointState:
-    """Decode one message in JSON, with the field names of the ROS 2 message.
-
-    Raises ValueError where it is no JointState.
-    """
+    """Decode JSON with the field names of the ROS 2 message. Raises ValueError where it is no JointState."""
     content = from_json(message)
     if not isinstance(content, dict):
         raise ValueError("the JSON message is not an object")
@@ -240,13 +226,7 @@ class JointStateEncoder:
         self._numbers = [np.frombuffer(message, "<f8", count, at) for count, at in zip(counts, places, strict=True)]
 
     def encode(self, stamp_ns: int, position: Array, velocity: Array | None, effort: Array | None) -> bytes:
-        """One message.
-
-        `stamp_ns`: time of measurement since 1970 [ns].
-        `position`: (n,) [rad or m].
-        `velocity`: (n,) [rad/s or m/s]; None where the layout has none.
-        `effort`: (n,) [Nm or N]; None where the layout has none.
-        """
+        """One message of `position`, `velocity`, `effort`, (n,) each [SI]; None where the layout has none."""
         _STAMP.pack_into(self._message, len(_ENCAPSULATION), stamp_ns // _NANOSECONDS, stamp_ns % _NANOSECONDS)
         for target, values in zip(self._numbers, (position, velocity, effort), strict=True):
             if values is not None:

@@ -14,17 +14,13 @@ _NANOSECONDS = 1_000_000_000
 _STATES = {"timestamp": 1, "joints": 2}
 _STATE = {"name": 1, "position": 2, "velocity": 3, "acceleration": 4, "effort": 5}
 _QUANTITIES = ("position", "velocity", "effort")
+_NAN = struct.pack("<d", np.nan)
 
 Value = int | bytes
 
 
 def decode_foxglove_protobuf(schema: bytes) -> Callable[[bytes], JointState]:
-    """The decoder of a log's messages.
-
-    Raises ValueError where the schema cannot be read; so does the decoder where a message is no JointStates.
-
-    `schema`: FileDescriptorSet of the type; empty for the numbers that Foxglove publishes.
-    """
+    """The decoder of JointStates by a FileDescriptorSet, or by Foxglove's numbers. Both raise ValueError."""
     numbers = _field_numbers(schema)
     states, state = numbers.get("JointStates", _STATES), numbers.get("JointState", _STATE)
     wanted = {state[name]: name for name in _QUANTITIES if name in state}
@@ -38,7 +34,7 @@ def decode_foxglove_protobuf(schema: bytes) -> Callable[[bytes], JointState]:
             elif number == states["joints"]:
                 joints.append(dict(_fields(_require_bytes(value))))
         names = tuple(_require_bytes(joint.get(state["name"], b"")).decode("utf-8") for joint in joints)
-        rows = {name: [_double(joint.get(number)) for joint in joints] for number, name in wanted.items()}
+        rows = {name: [_double(joint.get(number, _NAN)) for joint in joints] for number, name in wanted.items()}
         arrays = (np.array(rows.get(name, ()), dtype=np.float64) for name in _QUANTITIES)
         return JointState(stamp, names, *(array if np.isfinite(array).any() else np.empty(0) for array in arrays))
 
@@ -92,9 +88,7 @@ def _varint(message: bytes, at: int) -> tuple[int, int]:
             return value, at
 
 
-def _double(value: Value | None) -> float:
-    if value is None:
-        return np.nan
+def _double(value: Value) -> float:
     return float(struct.unpack("<d", _require_bytes(value))[0])
 
 
@@ -112,20 +106,14 @@ _EFFORTS = ("effort", "torque", "current")
 
 
 def find_decoder(type_name: str, encoding: str, schema: bytes) -> Decoder | None:
-    """The decoder of a topic's messages, None where they are no joint states.
-
-    `schema`: of the type, empty where the log has none.
-    """
+    """The decoder of a topic's messages, None where they are no joint states; `schema` is empty where unknown."""
     if (type_name, encoding) == ("foxglove.JointStates", "protobuf"):
         return decode_foxglove_protobuf(schema)
     return _DECODERS.get((type_name, encoding))
 
 
 def decode_ros1(message: bytes) -> JointState:
-    """Decode sensor_msgs/JointState of ROS 1: no alignment, strings without a closing NUL.
-
-    Raises ValueError where it is no JointState.
-    """
+    """Decode sensor_msgs/JointState of ROS 1, unaligned, no closing NUL. Raises ValueError where it is none."""
     try:
         _, seconds, nanoseconds, length = struct.unpack_from("<IIII", message)
         at = 16 + length
@@ -149,10 +137,7 @@ def decode_ros1(message: bytes) -> JointState:
 
 
 def decode_dynamic(message: bytes) -> JointState:
-    """Decode control_msgs/msg/DynamicJointState: per joint, names and values of its interfaces.
-
-    Raises ValueError where it is no DynamicJointState.
-    """
+    """Decode control_msgs/msg/DynamicJointState: each joint's named interfaces. Raises ValueError where it is none."""
     cursor = CdrCursor(message)
     stamp = cursor.stamp()
     cursor.string()  # frame_id
@@ -180,13 +165,12 @@ def decode_foxglove_json(message: bytes) -> JointState:
     names = [joint.get("name") for joint in joints]
     if not all(isinstance(name, str) for name in names):
         raise ValueError("a joint has no name")
-    fields = ("position", "velocity", "effort")
-    known = [{field: joint[field] for field in fields if _is_number(joint.get(field))} for joint in joints]
-    return JointState(json_stamp(content.get("timestamp")), tuple(names), *(_gather(known, field) for field in fields))
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    known = [
+        {field: joint[field] for field in _QUANTITIES if type(joint.get(field)) in (int, float)} for joint in joints
+    ]
+    return JointState(
+        json_stamp(content.get("timestamp")), tuple(names), *(_gather(known, field) for field in _QUANTITIES)
+    )
 
 
 def _gather(joints: Sequence[Mapping[str, float]], field: str) -> Array:

@@ -155,10 +155,7 @@ class JointStateTopic:
         return self._rows is not None and self._rows.has_effort
 
     def finish(self) -> Recording:
-        """The recording that this topic holds.
-
-        Raises RecordingError, which names the message at fault, counted from 1 within the topic.
-        """
+        """The recording that this topic holds. Raises RecordingError, which numbers its messages from 1."""
         self.flush()
         if self.fault is not None:
             raise self.fault
@@ -304,14 +301,9 @@ def _merge(batches: Sequence[Batch]) -> Batch:
         each.velocity if each.velocity.shape[1] or not has_velocity else np.full_like(each.position, np.nan)
         for each in states
     ]
-    merged = JointStates(
-        np.concatenate([each.stamp for each in states])[order],
-        states[0].names,
-        np.concatenate([each.position for each in states])[order],
-        np.concatenate(velocity)[order],
-        np.concatenate([each.effort for each in states])[order],
-    )
-    return rows[order], merged
+    parts = ([each.position for each in states], velocity, [each.effort for each in states])
+    stamp = np.concatenate([each.stamp for each in states])[order]
+    return rows[order], JointStates(stamp, states[0].names, *(np.concatenate(part)[order] for part in parts))
 
 
 def _require_equal(states: JointStates, place: str) -> None:
@@ -372,10 +364,7 @@ class JointStateLog:
 
 
 def choose_topic(topics: Mapping[str, JointStateTopic], other_topics: Sequence[str], file: str) -> JointStateTopic:
-    """The one topic with efforts of the wanted joints, or the one of several that ROS itself would take.
-
-    Raises RecordingError where there is none, or more than one and none of them is ``/joint_states``.
-    """
+    """The one topic with efforts of the wanted joints, or the one that ROS would take. Raises RecordingError."""
     filled = {name: topic for name, topic in topics.items() if topic.messages}
     if not filled:
         found = f"; it holds the topics {listed(sorted(set(other_topics)))}" if other_topics else ""

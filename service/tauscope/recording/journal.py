@@ -68,12 +68,7 @@ class JournalWriter:
         self._start()
 
     def write_rows(self, rows: NDArray[np.void]) -> None:
-        """Write cycles.
-
-        Raises OSError where the disk does not take them.
-
-        `rows`: (k,) of `journal_row_type`, the cycles, oldest first.
-        """
+        """Write cycles, `rows`: (k,) of `journal_row_type`. Raises OSError where the disk does not take them."""
         before = self._file.tell()
         for row in rows:
             stamp = int(row["time_ns"]) + self.header.epoch_offset_ns

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic_core import from_json
 
-from tauscope.errors import RecordingError
+from tauscope.errors import RecordingError, explain_os_errors
 from tauscope.recording.joint_state import JointStateLayout, JointStates
 from tauscope.recording.joint_state_topic import MessageHandler
 from tauscope.recording.journal import CYCLE_TOPIC, EVENT_TOPIC, JOINT_STATE_TOPIC, REFERENCE_TOPIC
@@ -36,15 +36,10 @@ class Journal:
 
 
 def read_journal(path: Path) -> Journal:
-    """Read a journal up to its end or its first damage.
-
-    Raises RecordingError where the file cannot be read, or its header did not come through.
-    """
+    """Read a journal up to its end or its first damage. Raises RecordingError where its header did not come through."""
     collector = _Collector()
-    try:
+    with explain_os_errors(RecordingError, f"{path}: the journal cannot be read"):
         damage = scan_mcap(path, collector)
-    except OSError as error:
-        raise RecordingError(f"{path}: the journal cannot be read ({error.strerror or error})") from error
     try:
         header = collector.header()
         return Journal(header, collector.rows(header), tuple(collector.events[1:]), damage)
@@ -54,31 +49,25 @@ def read_journal(path: Path) -> Journal:
 
 
 def journal_recording(journal: Journal, name: str) -> Recording:
-    """The recording of a journal's motion, without the ramp; time runs from the motion's first sample.
+    """A journal's motion from its first sample, without ramp: reported columns, qref, taucmd and period where known.
 
-    Columns t, q, tau (i where the drives report no torque), qd, temp and volt where they report them, qref, taucmd
-    where effort was commanded, and period where the motion is repeated. Where the host commanded effort, tau (i) is the
-    mean of what acted before and after the sample; the journal keeps what was reported. Raises RecordingError: next to
-    nothing of the motion is there.
+    Where the host commanded effort, tau (i) is the mean of what acted before and after the sample. Raises
+    RecordingError where the motion was never reached.
     """
     rows, header = journal.motion, journal.header
     if not len(rows):
         ramp = f" of {len(journal.rows)} cycles of the ramp" if len(journal.rows) else ""
         raise RecordingError(f"{name}: the run ended before its motion began{ramp}: there is nothing to keep")
-    is_torque = header.effort_unit == "Nm"
-    is_held = header.mode == "torque"
+    is_torque, is_held = header.effort_unit == "Nm", header.mode == "torque"
     return Recording.from_arrays(
         name,
         (rows["time_ns"] - rows["time_ns"][0]) * 1e-9,
         rows["position"],
         _sample_effort(rows, 1e9 / header.rate_hz) if is_held else rows["effort"],
         effort_kind=EffortKind.TORQUE if is_torque else EffortKind.CURRENT,
-        velocity=_find_reported(rows["velocity"]),
-        reference=_find_reported(rows["reference"]),
         effort_command=_find_reported(rows["command"]),
-        temperature=_find_reported(rows["temperature"]),
-        voltage=_find_reported(rows["voltage"]),
         period=_find_reported(rows["period"]),
+        **{name: _find_reported(rows[name]) for name in ("velocity", "reference", "temperature", "voltage")},
     )
 
 

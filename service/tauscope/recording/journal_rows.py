@@ -15,10 +15,8 @@ JOURNAL_FORM = "tauscope.journal/1"
 class Phase(IntEnum):
     """What the arm was doing in a cycle."""
 
-    RAMP = 0
-    """On its way to where the motion starts."""
-    MOTION = 1
-    """The motion that the recording is about."""
+    RAMP = 0  # on its way to where the motion starts
+    MOTION = 1  # the motion that the recording is about
 
 
 @dataclass(frozen=True)

@@ -22,18 +22,12 @@ ONE_TURN = 2.0 * np.pi
 
 @dataclass(frozen=True, eq=False)
 class LinkEncoders:
-    """What the columns qlink say.
+    """What the columns qlink say."""
 
-    `lag`: (N, n), q - qlink without whole turns and without its median [rad or m]; NaN where either is missing or a
-        glitch.
-    `joints`: joints, from 0, that have an encoder on the link.
-    `copies`, `strangers`: joints whose column repeats q, and whose column does not move with it.
-    """
-
-    lag: Array
-    joints: tuple[int, ...]
-    copies: tuple[int, ...]
-    strangers: tuple[int, ...]
+    lag: Array  # (N, n), q - qlink less whole turns and its median [rad or m]; NaN where either is missing or a glitch
+    joints: tuple[int, ...]  # joints, from 0, that have an encoder on the link
+    copies: tuple[int, ...]  # joints whose column repeats q
+    strangers: tuple[int, ...]  # joints whose column does not move with q
 
 
 def find_link_encoders(samples: Samples, types: Sequence[JointType]) -> LinkEncoders | None:
@@ -71,13 +65,9 @@ def link_warnings(
         return []
     copy = "repeats column q{0}: it is no second encoder, and is not used", "record the encoder on the link itself"
     strange = "does not move with column q{0}; it is not used", "check its unit, its sign and its joint"
-    return [
-        ResultWarning(
-            code="link-encoder",
-            joint=joints[joint],
-            text=f"column qlink{joint + 1} {text.format(joint + 1)}",
-            remedy=remedy,
-        )
-        for places, (text, remedy) in ((found.copies, copy), (found.strangers, strange))
-        for joint in places
-    ]
+    warnings = []
+    for places, (what, remedy) in ((found.copies, copy), (found.strangers, strange)):
+        for joint in places:
+            text = f"column qlink{joint + 1} {what.format(joint + 1)}"
+            warnings.append(ResultWarning(code="link-encoder", joint=joints[joint], text=text, remedy=remedy))
+    return warnings

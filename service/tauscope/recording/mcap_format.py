@@ -62,10 +62,7 @@ def find_handler(sink: MessageSink, channel: Channel, schemas: Mapping[int, Sche
 
 
 def unpack_chunk(body: bytes) -> bytes:
-    """Records within a chunk, their checksum compared.
-
-    Raises ValueError where the chunk is damaged or implausibly large, among other errors of `UNREADABLE`.
-    """
+    """Records within a chunk. Raises an error of `UNREADABLE` where it is damaged or implausibly large."""
     chunk = Chunk.read(ReadDataStream(BytesIO(body)))
     if chunk.compression not in ("", "zstd", "lz4"):
         raise ValueError(f"unknown compression {chunk.compression[:20]!r}")
@@ -109,12 +106,7 @@ class _Part:
 
 
 def read_by_index(file: BinaryIO, size: int, sink: MessageSink) -> bool:
-    """Hand the wanted messages over in the order of the file.
-
-    Raises DamageError where a chunk is not as the index says.
-
-    Returns bool: False, and nothing was handed over, where the file has no sound index or most of it is wanted.
-    """
+    """Hand wanted messages over; False if most is wanted or the index unsound. Raises DamageError at bad chunks."""
     try:
         summary = _read_summary(file, size)
         if summary is None:
@@ -239,10 +231,7 @@ def add_mcap(path: Path, name: str, log: JointStateLog) -> None:
 
 
 def recover_mcap(path: Path, choice: Choice) -> tuple[Recording, str | None]:
-    """What comes before the damage of an MCAP file, and that damage, None where it is whole.
-
-    Raises RecordingError where nothing usable comes before the damage.
-    """
+    """What comes before the damage of an MCAP file, and the damage. Raises RecordingError where nothing does."""
     log = JointStateLog(choice)
     damage = scan_mcap(path, log)
     if damage is not None and log.samples < MINIMUM_ROWS:
@@ -251,10 +240,7 @@ def recover_mcap(path: Path, choice: Choice) -> tuple[Recording, str | None]:
 
 
 def scan_mcap(path: Path, sink: MessageSink) -> str | None:
-    """Hand the messages of an MCAP file over, in the order of the file, up to its end or its first damage.
-
-    Returns str or None: why reading stopped before the file's end, None where it is whole.
-    """
+    """Hand the messages of an MCAP file over up to its end, or to its first damage, which is returned."""
     with path.open("rb") as file:
         try:
             _Scan(file, path.stat().st_size, sink).run()

@@ -8,7 +8,7 @@ from pathlib import Path
 from pydantic import Field
 
 from tauscope.errors import RecordingError
-from tauscope.recording.column_files import ZIP_MAGIC, read_npz, read_npz_header
+from tauscope.recording import column_files
 from tauscope.recording.columns import find_layout, is_column, require_joint_count, suggest_layout
 from tauscope.recording.csv_format import read_csv, read_csv_header
 from tauscope.recording.intake import Choice
@@ -16,7 +16,6 @@ from tauscope.recording.joint_state_topic import JointStateLog
 from tauscope.recording.layout.guess import guess_parts
 from tauscope.recording.layout.rename import rename_columns
 from tauscope.recording.mcap_format import MCAP_MAGIC, add_mcap
-from tauscope.recording.parquet_format import PARQUET_MAGIC, read_parquet, read_parquet_header
 from tauscope.recording.recording import Recording
 from tauscope.recording.ros_bags import ROS1_MAGIC, SQLITE_MAGIC, add_database, add_ros1_bag, add_rosbag2
 from tauscope.recording.units import SI, Reading
@@ -39,11 +38,11 @@ class _Format:
 
 
 _FORMATS = (
-    _Format(PARQUET_MAGIC, read_parquet, read_parquet_header, reads_ranges=True),
+    _Format(column_files.PARQUET_MAGIC, column_files.read_parquet, column_files.read_parquet_header, reads_ranges=True),
     _Format(MCAP_MAGIC, add_log=add_mcap, reads_ranges=True),
     _Format(SQLITE_MAGIC, add_log=add_database),
     _Format(ROS1_MAGIC, add_log=add_ros1_bag),
-    _Format(ZIP_MAGIC, read_npz, read_npz_header),
+    _Format(column_files.ZIP_MAGIC, column_files.read_npz, column_files.read_npz_header),
 )
 _CSV = _Format(b"", read_csv, read_csv_header)
 _FOLDER = _Format(b"", add_log=add_rosbag2, reads_ranges=True)
@@ -67,12 +66,9 @@ _FOREIGN = (
 def read_recording(
     path: str | Path, joint_count: int | None = None, joint_names: Sequence[str] | None = None, reading: Reading = SI
 ) -> Recording:
-    """Read a recording: CSV, Parquet, MCAP, a ROS 1 bag, or a rosbag2 folder or database; told apart by content.
+    """Read CSV, Parquet, MCAP, a ROS 1 bag, or a rosbag2 folder or database, told apart by content.
 
-    Raises RecordingError where the file cannot be read or breaks a rule; the message names the place. Raises
-    RecordingMismatchError where the recording has other joints than asked for.
-
-    `joint_count`: joints that the recording must have; None where any number is welcome, or as many as `joint_names`.
+    Raises RecordingError, which names the place; RecordingMismatchError for other joints than `joint_count` asks for.
     """
     path = find_path(path)
     name = printable(str(path), _LONGEST_PATH)
@@ -92,10 +88,7 @@ def read_recording(
 
 
 def read_header(path: Path) -> list[str]:
-    """Names of the columns of a CSV or Parquet file; numbers from 1 where there are none.
-
-    Raises RecordingError where the file cannot be read, or is a log, which names its joints itself.
-    """
+    """Names of a table's columns, or numbers from 1. Raises RecordingError where it is a log, which names joints."""
     path = find_path(path)
     name = printable(str(path), _LONGEST_PATH)
     try:
@@ -111,10 +104,7 @@ def read_header(path: Path) -> list[str]:
 
 
 def first_bytes(path: Path, name: str) -> bytes:
-    """The first bytes of a regular file, by which formats are told apart.
-
-    Raises RecordingError where it is not a regular file.
-    """
+    """The first bytes of a file, by which formats are told apart. Raises RecordingError where it is not regular."""
     if isinstance(path, Path) and not path.is_file():
         if not path.exists():
             raise FileNotFoundError(errno.ENOENT, "no such file")
@@ -169,10 +159,7 @@ class ColumnMapping:
 
 
 def find_mapping(path: Path, robot: Robot | None = None, reading: Reading = SI) -> ColumnMapping:
-    """The mapping by which a table is read; where none is, as much as its column names suggest.
-
-    Raises RecordingError where the header cannot be read, or the file is a log, which names its joints itself.
-    """
+    """The mapping by which a table is read, or that its column names suggest. Raises RecordingError for a log."""
     header = tuple(read_header(path))
     reading = reading.for_robot(robot)
     try:

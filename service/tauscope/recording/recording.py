@@ -17,10 +17,7 @@ __all__ = ["Array", "EffortKind", "Recording", "Samples", "Table", "take_command
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One continuous motion as it was measured.
-
-    `effort_std`: relative standard error of each joint's effort as a whole; empty where it was measured.
-    """
+    """One continuous motion as it was measured."""
 
     name: str
     joint_count: int
@@ -28,6 +25,7 @@ class Recording:
     table: Table
     ignored_columns: tuple[str, ...] = ()
     notes: tuple[ResultWarning, ...] = ()  # warnings without its name
+    # relative standard error of each joint's effort as a whole; empty where measured
     effort_std: tuple[float, ...] = ()
     is_examined: bool = False  # whether units and samples were looked at, so that they need not be again
 
@@ -45,11 +43,7 @@ class Recording:
         return any(name.rstrip("0123456789") == group for name in self.table.names)
 
     def samples(self, start: int = 0, stop: int | None = None) -> Samples:
-        """Samples start:stop, as read-only views of the table where its columns allow.
-
-        `start`: first sample, counted from 0; `stop`: the one after the last; None for the end. Returns Samples: the
-        columns that the recording has; None for the others.
-        """
+        """Samples start:stop, as read-only views of the table where its columns allow; None for columns it lacks."""
         first, last, _ = slice(start, stop).indices(len(self.table))
         block = self.table.rows(first, max(first, last))
         where = {name: index for index, name in enumerate(self.table.names)}
@@ -64,14 +58,7 @@ class Recording:
         )
 
     def joint_torque(self, effort: Array, robot: Robot) -> Array:
-        """Turn recorded efforts into joint torque: τ = sign · k · effort, with k = 1 where torque was recorded.
-
-        Raises RecordingMismatchError where the efforts have another number of joints than the robot. Raises
-        RecordingError where commands were recorded, and no actuator has made torque of them.
-
-        `effort`: (N, n), `Samples.effort` of this recording [Nm or N, or drive units]. Returns (N, n), joint torque [Nm
-        or N].
-        """
+        """τ = sign · k · effort, k = 1 of recorded torque; `effort` and τ (N, n). Raises a RecordingMismatchError."""
         if self.effort_kind is EffortKind.COMMAND:
             raise RecordingError(
                 f"{self.name}: column tau1 is missing, and joint 1 ({robot.joints[0].name}) has no position loop that"
@@ -97,16 +84,10 @@ class Recording:
         period: Array | None = None,
         **optional: Array | None,
     ) -> "Recording":
-        """Make a recording of arrays, held to the same rules as a file.
+        """Make a recording of arrays, held to the same rules as a file: `time`, (N,), strictly increasing [s].
 
-        Raises RecordingError, which names the argument, the row (counted from 0, as NumPy does) and the joint at fault.
-        Raises TypeError for another argument than those of `Samples`.
-
-        `time`: (N,), strictly increasing [s].
-        `position`: (N, n), q [rad or m].
-        `effort`: (N, n), τ [Nm or N], or drive units.
-        `period`: (N,), index of the repeated excitation period, NaN outside the repeated part.
-        `optional`: (N, n), the optional columns by their names in `Samples`, such as ``velocity``.
+        `position`, `effort`: (N, n), q and τ or drive units; `period`: (N,), NaN outside the repeated part; `optional`:
+        (N, n), as `Samples` names them. Raises RecordingError: argument, row from 0, joint; TypeError for others.
         """
         unknown = optional.keys() - {_ARGUMENTS[group] for group in OPTIONAL_GROUPS}
         if unknown:
@@ -130,37 +111,20 @@ class Recording:
         require_rising(data[:, 0], -np.inf, name, lambda row: f"row {row}")
         return Recording(name, shape[1], effort_kind, MemoryTable(names, data))
 
-    @staticmethod
-    def _group(block: Array, group: str, where: Mapping[str, int]) -> Array | None:
+    def _group(self, block: Array, group: str, where: Mapping[str, int]) -> Array | None:
         """One column a joint; a view where the file has all of them, NaN where it lacks one."""
-        joints = [(joint, where[name]) for name in where if (joint := _joint_of(name, group)) is not None]
-        if not joints:
-            return None
-        joint_count = sum(_joint_of(name, "q") is not None for name in where)
-        first = joints[0][1]
-        if len(joints) == joint_count:
-            return block[:, first : first + joint_count]
-        columns = np.full((len(block), joint_count), np.nan)
-        for joint, index in joints:
-            columns[:, joint - 1] = block[:, index]
-        return columns
+        joints = range(self.joint_count)
+        places = {joint: where[name] for joint in joints if (name := f"{group}{joint + 1}") in where}
+        if len(places) == self.joint_count:
+            return block[:, places[0] : places[0] + self.joint_count]
+        columns = np.full((len(block), self.joint_count), np.nan)
+        for joint, place in places.items():
+            columns[:, joint] = block[:, place]
+        return columns if places else None
 
 
-_ARGUMENTS = {
-    "volt": "voltage",
-    "kp": "gain",
-    "qd": "velocity",
-    "qdd": "acceleration",
-    "qref": "reference",
-    "taucmd": "effort_command",
-    "temp": "temperature",
-    "qlink": "link_position",
-}
-
-
-def _joint_of(name: str, group: str) -> int | None:
-    number = name.removeprefix(group)
-    return int(number) if number != name and number.isdecimal() else None
+_NAMES = ("velocity", "acceleration", "reference", "effort_command", "temperature", "link_position", "voltage", "gain")
+_ARGUMENTS = dict(zip(OPTIONAL_GROUPS, _NAMES, strict=True))
 
 
 def _check(argument: str, array: Array, name: str, shape: tuple[int | None, ...] | None) -> Array:

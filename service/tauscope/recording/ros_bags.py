@@ -30,11 +30,7 @@ _LARGEST_HEADER_BYTES = 2**16
 
 
 def add_ros1_bag(path: Path, name: str, log: JointStateLog) -> None:
-    """Add the joint states of a ROS 1 bag to a log; only chunks that hold messages of their topics are read.
-
-    Raises MissingExtraError where rosbags is not installed. Raises RecordingError where the bag is damaged or not
-    indexed.
-    """
+    """Add joint states by the bag's index. Raises MissingExtraError without rosbags, RecordingError where damaged."""
     with require_extra(f"{name}: a ROS 1 bag"):
         rosbag1: Any = import_module("rosbags.rosbag1")
     unreadable = (ValueError, KeyError, IndexError, EOFError, OSError, RuntimeError, MemoryError, struct.error)
@@ -106,10 +102,7 @@ _SQLITE_HEADER_BYTES = 100
 
 
 def add_rosbag2(folder: Path, bag: str, log: JointStateLog) -> None:
-    """Add the joint states of a rosbag2 folder to a log, its files in the order in which they were recorded.
-
-    Raises RecordingError where a file is missing or damaged.
-    """
+    """Add a rosbag2 folder to a log, file by file. Raises RecordingError where a file is missing or damaged."""
     for file in _files(folder, bag):
         name = f"{bag}/{printable(file)}"
         path = folder / file

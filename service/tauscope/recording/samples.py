@@ -22,26 +22,19 @@ class EffortKind(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """A stretch of a recording as it was measured; NaN marks a sample that was missed.
-
-    `effort`: (N, n), τ [Nm or N], or drive units (current), or commanded positions, as `Recording.effort_kind` says,
-        sign and constant not yet applied.
-    `velocity`, `acceleration`, `reference`, `effort_command`, `temperature`, `link_position`, `voltage`, `gain`: (N,
-        n) or None, the optional columns qd, qdd, qref, taucmd, temp, qlink, volt, kp; a joint without such a column is
-        NaN.
-    """
+    """A stretch of a recording as it was measured; NaN: a sample that was missed, or a joint without the column."""
 
     time: Array  # (N,), strictly increasing [s]
     position: Array  # (N, n), q [rad or m]
-    effort: Array
-    velocity: Array | None = None
-    acceleration: Array | None = None
-    reference: Array | None = None
-    effort_command: Array | None = None
-    temperature: Array | None = None
-    link_position: Array | None = None
-    voltage: Array | None = None
-    gain: Array | None = None
+    effort: Array  # (N, n), τ, drive units or commanded positions, as `effort_kind` says; sign and constant not applied
+    velocity: Array | None = None  # (N, n), column qd
+    acceleration: Array | None = None  # (N, n), column qdd
+    reference: Array | None = None  # (N, n), column qref
+    effort_command: Array | None = None  # (N, n), column taucmd
+    temperature: Array | None = None  # (N, n), column temp
+    link_position: Array | None = None  # (N, n), column qlink
+    voltage: Array | None = None  # (N, n), column volt
+    gain: Array | None = None  # (N, n), column kp
     period: Array | None = None  # (N,), index of the repeated excitation period, NaN outside the repeated part
 
     @property
@@ -70,10 +63,7 @@ MINIMUM_ROWS = 10  # fewer samples than this are a mistake and not a motion
 
 
 class RowCheck:
-    """Checks blocks of rows: time is known, no number is infinite, a period is a whole number.
-
-    NaN is a missed sample and welcome in every column but time.
-    """
+    """Checks that time is known, no number is infinite, and a period is whole; NaN is a missed sample."""
 
     def __init__(self, file: str, names: tuple[str, ...]) -> None:
         self._file = file
@@ -81,12 +71,7 @@ class RowCheck:
         self._period = names.index("period") if "period" in names else None
 
     def __call__(self, block: Array, place: Callable[[int], str]) -> None:
-        """Check the next block.
-
-        Raises RecordingError, which names the row and the column at fault.
-
-        `block`: (rows, columns), the rows.
-        """
+        """Check the next `block`. Raises RecordingError, which names the row and the column."""
         if not len(block):
             return
         if np.isinf(block).any():
@@ -112,12 +97,7 @@ class RowCheck:
 
 
 def require_rising(time: Array, previous: float, file: str, place: Callable[[int], str]) -> None:
-    """Refuse time that does not rise from row to row.
-
-    Raises RecordingError, which names the row.
-
-    `time`: (rows,), stamps [s]; `previous`: the stamp before them [s].
-    """
+    """Raise RecordingError, which names the row, where `time` (rows,) does not rise from `previous` on."""
     is_up = np.diff(time, prepend=previous) > 0
     if is_up.all():
         return

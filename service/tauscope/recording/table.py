@@ -3,12 +3,11 @@
 import os
 import tempfile
 import weakref
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 
 import numpy as np
 
-from tauscope.errors import RecordingError
+from tauscope.errors import RecordingError, explain_os_errors
 from tauscope.recording.samples import Array, Table
 
 # Tables larger than this go to a temporary file: 1.3 million samples of a six-joint arm still fit into memory.
@@ -34,11 +33,7 @@ class MemoryTable:
 
 
 class SpooledTable:
-    """Rows in an unnamed temporary file of the system's temporary folder (TMPDIR); it vanishes with this object.
-
-    Read by `preadv` and not mapped: pages of a map count as memory of this process. No file position is shared, so that
-    several threads may read at once.
-    """
+    """Rows in an unnamed temporary file (TMPDIR), read by `preadv`: mapped pages count as memory of the process."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self.names = names
@@ -77,10 +72,7 @@ class TableBuilder:
     def __init__(
         self, names: tuple[str, ...], expected_rows: int = 0, spool_above_bytes: int = SPOOL_ABOVE_BYTES
     ) -> None:
-        """Prepare an empty table.
-
-        `spool_above_bytes`: size of the rows above which they go to a temporary file [bytes].
-        """
+        """Prepare an empty table; larger ones than `spool_above_bytes` go to a temporary file."""
         self._names = names
         self._limit_rows = spool_above_bytes // (8 * len(names))
         self._length = 0
@@ -94,12 +86,7 @@ class TableBuilder:
         return self._length
 
     def append(self, block: Array) -> None:
-        """Add rows behind the last one.
-
-        Raises RecordingError where the temporary folder has no room left.
-
-        `block`: (rows, columns), the rows; copied.
-        """
+        """Add a copy of `block`, (rows, columns). Raises RecordingError where the temporary folder is full."""
         length = self._length + len(block)
         if self._spool is None and length > self._limit_rows:
             self._start_spool()
@@ -107,8 +94,10 @@ class TableBuilder:
             with _naming_room():
                 self._spool.append(block)
         else:
-            if length > len(self._data):
-                self._grow(length)
+            if length > len(self._data):  # by half as much again, so that growing stays linear in total
+                grown = np.empty((min(max(length, len(self._data) * 3 // 2), self._limit_rows), len(self._names)))
+                grown[: self._length] = self._data[: self._length]
+                self._data = grown
             self._data[self._length : length] = block
         self._length = length
 
@@ -118,12 +107,6 @@ class TableBuilder:
             return self._spool
         return MemoryTable(self._names, self._data[: self._length])
 
-    def _grow(self, length: int) -> None:
-        """Make room for at least `length` rows, by half as much again so that growing stays linear in total."""
-        grown = np.empty((min(max(length, len(self._data) * 3 // 2), self._limit_rows), len(self._names)))
-        grown[: self._length] = self._data[: self._length]
-        self._data = grown
-
     def _start_spool(self) -> None:
         with _naming_room():
             self._spool = SpooledTable(self._names)
@@ -131,13 +114,7 @@ class TableBuilder:
         self._data = np.empty((0, len(self._names)))
 
 
-@contextmanager
-def _naming_room() -> Iterator[None]:
+def _naming_room() -> AbstractContextManager[None]:
     """Say in which folder there is no room. Raises RecordingError."""
-    try:
-        yield
-    except OSError as error:
-        raise RecordingError(
-            f"the temporary folder {tempfile.gettempdir()} cannot hold the recording ({error.strerror}): "
-            "make room there or set TMPDIR to a larger folder"
-        ) from error
+    words = f"the temporary folder {tempfile.gettempdir()} cannot hold the recording"
+    return explain_os_errors(RecordingError, words, ": make room there or set TMPDIR to a larger folder")

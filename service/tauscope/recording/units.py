@@ -1,14 +1,14 @@
 """From the units that a file is written in to SI: factors of its columns, and the clock of its rows."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tauscope.errors import RecordingError
 from tauscope.recording.layout.presets import PRESET_OF
 from tauscope.recording.samples import Array, EffortKind
-from tauscope.robot.recording_layout import DELIMITERS, RecordingLayout, Source, find_fault
+from tauscope.robot.recording_layout import DELIMITERS, RecordingLayout, find_fault
 from tauscope.robot.robot import JointType, Robot
 
 SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # units of time [s]
@@ -22,33 +22,18 @@ _FOLLOWERS: Mapping[str, tuple[str, ...]] = {"q": ("q", "qref", "qlink"), "qd": 
 
 
 @dataclass(frozen=True)
-class Reading:
-    """How a file is to be read.
+class Reading(RecordingLayout):
+    """How a file is to be read: its layout, SI where it states no unit, and what is known of the robot."""
 
-    `units`: unit of ``t``, ``q``, ``qd``, ``tau``, or of one joint's column, ``q3``; SI where none is stated.
-    `joint_types`: of the robot, where it is known: degrees are of revolute joints only, mm of prismatic ones.
-    `prefers_torque`: whether currents are of no use, because no torque constant is known.
-    `columns`, `decimal`, `delimiter`, `topic`: as in `RecordingLayout`.
-    `is_usual`: whether the columns are those of the robot file: recordings that Tauscope made have their own.
-    """
-
-    units: Mapping[str, str] = field(default_factory=dict)
-    rate_hz: float | None = None  # samples a second where t counts samples [Hz]
     trust_units: bool = False
-    joint_types: tuple[JointType, ...] | None = None
-    joint_names: tuple[str, ...] | None = None  # of the robot, where it is known
-    prefers_torque: bool = False
-    columns: Mapping[str, Source] | str | None = None
-    decimal: str | None = None
-    delimiter: str | None = None
-    topic: str | None = None
+    joint_types: tuple[JointType, ...] | None = None  # degrees are of revolute joints only, mm of prismatic ones
+    joint_names: tuple[str, ...] | None = None
+    prefers_torque: bool = False  # whether currents are of no use, because no torque constant is known
+    # whether the columns are those of the robot file: recordings that Tauscope made have their own
     is_usual: bool = False
 
     def for_robot(self, robot: Robot | None) -> "Reading":
-        """The same reading, with the units of the robot file where this one states none.
-
-        Raises RecordingError where a unit is not known, or the rate is missing.
-        """
+        """Fill in what the robot file states. Raises RecordingError for an unknown unit, or a missing rate."""
         layout = RecordingLayout() if robot is None else robot.recording
         columns = layout.columns if self.columns is None else self.columns
         preset = PRESET_OF[columns].units if isinstance(columns, str) else {}

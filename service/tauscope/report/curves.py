@@ -21,12 +21,7 @@ from tauscope.strict_model import ResultModel
 
 
 def envelope_indices(values: Array, most: int) -> NDArray[np.intp]:
-    """Samples that keep a curve's look: the least and the greatest of each of most/2 equal buckets, in order of time.
-
-    No peak is lost. NaN are passed over, but a bucket that holds nothing else keeps one of them, so that the gap shows.
-
-    `values`: (N,), the curve. Returns (M,) intp, increasing indices, M ≤ max(most, 2).
-    """
+    """Samples, increasing (M,), with least and greatest of each of most/2 buckets of `values`, (N,); NaN gaps show."""
     count = len(values)
     if count <= most:
         return np.arange(count)
@@ -92,19 +87,14 @@ BEYOND = 1.15  # the curve is drawn over this many times the largest speed in th
 
 @dataclass(frozen=True, eq=False)
 class FrictionCurve:
-    """τ_f(v) = τ_s A(K_v v) + τ_sc A(δ v) + τ_v v + offset of one joint.
-
-    `seen`: (float, float), least and greatest velocity in the recordings [rad/s or m/s].
-    `bin_velocity`, `bin_torque`: (B,), mean velocity, and mean of measured torque less the rigid body's, in velocity
-        bins.
-    """
+    """τ_f(v) = τ_s A(K_v v) + τ_sc A(δ v) + τ_v v + offset of one joint."""
 
     velocity: Array  # (G,), v, increasing, densest about zero [rad/s or m/s]
     torque: Array  # (G,), τ_f [Nm or N]
     std: Array  # (G,), its standard error, from the covariance of all its coefficients and shape constants [Nm or N]
-    seen: tuple[float, float]
-    bin_velocity: Array
-    bin_torque: Array
+    seen: tuple[float, float]  # (float, float), least and greatest velocity in the recordings [rad/s or m/s]
+    bin_velocity: Array  # (B,), mean of each velocity bin
+    bin_torque: Array  # (B,), mean of measured torque less the rigid body's
 
     @property
     def columns(self) -> dict[str, list[float]]:

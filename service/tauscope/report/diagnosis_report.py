@@ -8,18 +8,10 @@ from tauscope.diagnosis.documents.plots import DiagnosisPlots, diagnosis_plots
 from tauscope.diagnosis.documents.result import FindingEntry
 from tauscope.diagnosis.next_experiment import PlannedExperiment
 from tauscope.number_text import chance, counted, significant
+from tauscope.report import tables
 from tauscope.report.figures import difference_figure, heat_map, heat_table, motion_figure, proof_figure, shift_figure
 from tauscope.report.page import Card, Drawing, Fold, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.provenance import Provenance
-from tauscope.report.tables import (
-    csv_text,
-    detectable_table,
-    difference_table,
-    headroom_table,
-    located_table,
-    residual_table,
-    shift_table,
-)
 from tauscope.report.words import (
     MOST_FINDINGS,
     constancy_sentence,
@@ -87,18 +79,13 @@ def _where(plots: DiagnosisPlots, document: DiagnosisDocument, types: list[Joint
         " as a multiple of the noise."
     )
     label = "Residual of every joint by velocity, position, load, acceleration and time, as a multiple of the noise"
-    parts = [
-        Part(
-            title="What the model leaves",
-            figure=Drawing(heat_map(plots.histograms, document.joints, after=False), f"{label}, before", caption),
-        )
-    ]
+    drawn = heat_map(plots.histograms, document.joints, after=False)
+    parts = [Part(title="What the model leaves", figure=Drawing(drawn, f"{label}, before", caption))]
     if document.findings:
         drawn = heat_map(plots.histograms, document.joints, after=True)
         parts.append(Part(title="What is left with the findings", figure=Drawing(drawn, f"{label}, after", "")))
-    parts.append(
-        Part(table=located_table(document), numbers=Numbers("Numbers of the maps", heat_table(plots.histograms)))
-    )
+    numbers = Numbers("Numbers of the maps", heat_table(plots.histograms))
+    parts.append(Part(table=tables.located_table(document), numbers=numbers))
     pairs = zip(document.mismatch, types, strict=True)
     sentences = [location_sentence(entry, joint_type) for entry, joint_type in pairs if entry.significant]
     return Section("where", "Where", parts, sentences or ["At no joint is there more than noise."])
@@ -120,33 +107,28 @@ def _what(document: DiagnosisDocument) -> Section:
 
 
 def _cards(entries: Sequence[FindingEntry], joints: Sequence[str]) -> list[Card]:
-    return [
-        Card(
-            rank,
-            effect_title(entry.effect),
-            place_title(entry.joint),
-            entry.probability,
-            chance(entry.probability),
-            entry.statement,
-            finding_facts(entry, joints),
-        )
-        for rank, entry in enumerate(entries, start=1)
-    ]
+    cards = []
+    for rank, entry in enumerate(entries, start=1):
+        title, place, facts = effect_title(entry.effect), place_title(entry.joint), finding_facts(entry, joints)
+        odds = chance(entry.probability)
+        cards.append(Card(rank, title, place, entry.probability, odds, entry.statement, facts))
+    return cards
 
 
 def _how_much(document: DiagnosisDocument) -> Section:
-    parts = [Part(title="Residual rms at the recorded rate", table=residual_table(document))]
+    parts = [Part(title="Residual rms at the recorded rate", table=tables.residual_table(document))]
     if document.parameter_differences:
         svg = difference_figure("differences", document)
         drawing = Drawing(svg, "How far the simulation's parameters are off", "The arm less what it is compared with.")
-        parts.append(Part(title="What the simulation has wrong", figure=drawing, table=difference_table(document)))
+        differences = tables.difference_table(document)
+        parts.append(Part(title="What the simulation has wrong", figure=drawing, table=differences))
     if document.parameter_shifts:
         drawing = Drawing(
             shift_figure("shifts", document),
             "How far parameters moved when the findings were added",
             "What the left-out effects had been hiding in: estimates with the findings less those without.",
         )
-        parts.append(Part(title="What had been absorbed where", figure=drawing, table=shift_table(document)))
+        parts.append(Part(title="What had been absorbed where", figure=drawing, table=tables.shift_table(document)))
     return Section("how-much", "How much", parts, [constancy_sentence(document)])
 
 
@@ -157,21 +139,17 @@ def _proof(plots: DiagnosisPlots, document: DiagnosisDocument, units: list[str])
     for number, (overlay, unit) in enumerate(zip(plots.overlays, units, strict=True), start=1):
         spectrum = spectra.get(overlay.joint)
         names = ("time", "measured", "before", "after")
-        text = csv_text({name: getattr(overlay, name) for name in names})
+        text = tables.csv_text({name: getattr(overlay, name) for name in names})
         if spectrum is not None:
             names = ("frequency", "before", "after", "noise")
-            text += "\n\n" + csv_text({name: getattr(spectrum, name) for name in names})
-        parts.append(
-            Part(
-                title=overlay.joint,
-                figure=Drawing(
-                    proof_figure(f"proof-{number}", overlay, spectrum, unit),
-                    f"Torque of {overlay.joint}, measured and modelled without and with the findings",
-                    f"{file_title(overlay.recording)}, the stretch in which the findings take most off the residual.",
-                ),
-                numbers=Numbers(f"Numbers of {overlay.joint}", text=text),
-            )
+            text += "\n\n" + tables.csv_text({name: getattr(spectrum, name) for name in names})
+        drawing = Drawing(
+            proof_figure(f"proof-{number}", overlay, spectrum, unit),
+            f"Torque of {overlay.joint}, measured and modelled without and with the findings",
+            f"{file_title(overlay.recording)}, the stretch in which the findings take most off the residual.",
         )
+        numbers = Numbers(f"Numbers of {overlay.joint}", text=text)
+        parts.append(Part(title=overlay.joint, figure=drawing, numbers=numbers))
     motion = "on held-out motion, from which neither model was made" if held_out else "on the model's own motion"
     band = f"Torque below {significant(document.cutoff_hz, 3)} Hz {motion}."
     return Section("proof", "The proof", parts, [band])
@@ -186,7 +164,7 @@ def _headroom(document: DiagnosisDocument) -> Iterator[Section]:
         " box predicts."
     )
     statements = [entry.statement for entry in document.headroom]
-    yield Section("headroom", "Headroom", [Part(table=headroom_table(document))], [sentence, *statements])
+    yield Section("headroom", "Headroom", [Part(table=tables.headroom_table(document))], [sentence, *statements])
 
 
 def _next(document: DiagnosisDocument, planned: PlannedExperiment | None) -> Section:
@@ -199,9 +177,8 @@ def _next(document: DiagnosisDocument, planned: PlannedExperiment | None) -> Sec
     parts = []
     if planned is not None:
         svg = motion_figure("next-motion", planned.trajectory, list(document.joints))
-        caption = (
-            f"{significant(planned.trajectory.duration_s, 3)} s, within the robot file's limits, from rest to rest."
-        )
+        length = significant(planned.trajectory.duration_s, 3)
+        caption = f"{length} s, within the robot file's limits, from rest to rest."
         parts.append(Part(figure=Drawing(svg, "Positions of the motion to record next", caption)))
     words = ["tauscope", "run", "ROBOT.yaml", "--trajectory", wanted.trajectory or "NEXT.json", "--out", "next.csv"]
     note = None if wanted.trajectory else "`tauscope diagnose … --next-trajectory NEXT.json` writes the motion."
@@ -213,5 +190,5 @@ def _detectable(document: DiagnosisDocument) -> Section:
         "The smallest size of each effect that nine of ten such data sets would have shown. What is smaller may be"
         " there and not be named; – stands where no torque along this motion shows it, or it is one with a parameter."
     )
-    part = Part(table=detectable_table(document))
+    part = Part(table=tables.detectable_table(document))
     return Section("detectable", "What would have been seen", [part], [sentence])

@@ -125,17 +125,7 @@ def _draw_panel(axis: Axes, entries: Sequence[BaseParameterEntry]) -> None:
     values = np.array([entry.value for entry in entries])
     reach = DEVIATIONS * np.array([entry.std or 0.0 for entry in entries])
     axis.axvline(0.0, color=MUTED, linewidth=0.6)
-    axis.errorbar(
-        values,
-        places,
-        xerr=reach,
-        linestyle="none",
-        marker="o",
-        markersize=3.2,
-        color=PREDICTED,
-        elinewidth=1.1,
-        capsize=2.2,
-    )
+    axis.errorbar(values, places, xerr=reach, fmt="o", markersize=3.2, color=PREDICTED, elinewidth=1.1, capsize=2.2)
     axis.grid(visible=False, axis="y")
     _name_rows(axis, [_shorten(entry.name, LONGEST_LABEL) for entry in entries])
 
@@ -243,10 +233,7 @@ FRICTION_ROW_INCHES = 2.25
 def friction_figure(
     name: str, curves: Sequence[FrictionCurve], titles: Sequence[str], units: Sequence[tuple[str, str]]
 ) -> Markup:
-    """Draw the friction of every joint over velocity.
-
-    `units`: sequence of (str, str), units of velocity and of torque, one pair a joint.
-    """
+    """Draw the friction of every joint over velocity; `units` of velocity and torque, one pair a joint."""
     columns = min(COLUMNS, max(len(curves), 2))
     rows = math.ceil(len(curves) / columns)
 
@@ -270,16 +257,9 @@ def _draw_curve(axis: Axes, curve: FrictionCurve) -> None:
     inside = (curve.velocity >= curve.seen[0]) & (curve.velocity <= curve.seen[1])
     low, high = (curve.torque + sign * DEVIATIONS * curve.std for sign in (-1.0, 1.0))
     axis.fill_between(curve.velocity, low, high, color=BAND, linewidth=0, label="95 % confidence")
-    axis.plot(
-        curve.bin_velocity,
-        curve.bin_torque,
-        linestyle="none",
-        marker="o",
-        markersize=2.4,
-        markeredgewidth=0,
-        color=MEASURED,
-        label="measured less rigid body, mean a velocity bin",
-    )
+    dots = {"markersize": 2.4, "markeredgewidth": 0, "color": MEASURED}
+    label = "measured less rigid body, mean a velocity bin"
+    axis.plot(curve.bin_velocity, curve.bin_torque, "o", label=label, **dots)
     axis.plot(curve.velocity, curve.torque, color=PREDICTED, linestyle=(0, (2, 2)), linewidth=0.9, label="no data")
     axis.plot(curve.velocity[inside], curve.torque[inside], color=PREDICTED, linewidth=1.3, label="model")
     for edge in curve.seen:
@@ -292,9 +272,7 @@ PROOF_INCHES = 3.5
 
 def proof_figure(name: str, overlay: TorqueOverlay, spectrum: ResidualSpectrum | None, unit: str) -> Markup:
     """Draw torque, residual and the residual's spectrum of one joint, without and with the findings."""
-    time, measured, before, after = (
-        np.array(values) for values in (overlay.time, overlay.measured, overlay.before, overlay.after)
-    )
+    time, measured, before, after = map(np.array, (overlay.time, overlay.measured, overlay.before, overlay.after))
 
     def draw(figure: Figure) -> None:
         # t: torque, r: residual below it, s: spectrum beside both
@@ -345,10 +323,7 @@ ENLARGED_SHARE = 0.1  # part of the time that is enlarged: where the residual's 
 
 
 def torque_figure(name: str, series: TorqueSeries, joint: int, noise_std: float, unit: str) -> Markup:
-    """Draw one joint's torque and residual, whole and enlarged where they differ most.
-
-    `joint`: joint index, from 0; `noise_std`: σ of the sensor noise [Nm or N].
-    """
+    """Draw one joint's torque and residual, whole and enlarged where they differ most."""
     enlarged = worst_part(series.residual[:, joint], ENLARGED_SHARE)
 
     def draw(figure: Figure) -> None:
@@ -384,10 +359,7 @@ def torque_columns(series: TorqueSeries, joint: int) -> dict[str, list[float]]:
 
 
 def worst_part(residual: Array, share: float) -> slice:
-    """The stretch of this share of a residual whose mean square is greatest.
-
-    `residual`: (N,), NaN where nothing was measured.
-    """
+    """The stretch of this share of `residual`, (N,), NaN where missed, whose mean square is greatest."""
     length = min(max(int(len(residual) * share), 2), len(residual))
     total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(residual) ** 2)])
     start = int(np.argmax(total[length:] - total[:-length]))

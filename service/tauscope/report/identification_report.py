@@ -5,19 +5,11 @@ from collections.abc import Iterator, Sequence
 from tauscope.identification import Identification, IdentificationDocument, document
 from tauscope.number_text import counted, percent, significant
 from tauscope.recording import Recording
+from tauscope.report import tables
 from tauscope.report.curves import MOST_SERIES, TorqueSeries, friction_curve, torque_series
 from tauscope.report.figures import friction_figure, parameter_figure, residual_figure, torque_columns, torque_figure
 from tauscope.report.page import Drawing, KeyFigure, Numbers, Page, Part, Section, render
 from tauscope.report.provenance import Provenance
-from tauscope.report.tables import (
-    base_parameter_table,
-    conditioning_table,
-    csv_text,
-    fit_table,
-    friction_table,
-    link_table,
-    rotor_table,
-)
 from tauscope.report.words import band_words, cautions, fit_sentences, masked_samples, noise_ratio, noise_words
 
 _FRICTION_EQUATION = "τ_f(q̇) = τ_s A(K_v q̇) + τ_sc A(δ q̇) + τ_v q̇ + offset,  A(x) = (2/π) arctan x"
@@ -29,10 +21,7 @@ def identification_report(
     held_out: Sequence[Recording],
     provenance: Provenance,
 ) -> str:
-    """A self-contained HTML page on an identification.
-
-    Raises RecordingError where a recording cannot be conditioned again.
-    """
+    """A self-contained HTML page. Raises RecordingError where a recording cannot be conditioned again."""
     result = document(identification)
     train = [torque_series(identification, recording) for recording in recordings[:MOST_SERIES]]
     judged = [torque_series(identification, recording) for recording in held_out[:1]]
@@ -43,7 +32,7 @@ def identification_report(
         _friction_section(result, identification, train),
         _parameter_section(result),
         _link_section(result),
-        Section("data", "Recordings", [Part(table=conditioning_table(result))]),
+        Section("data", "Recordings", [Part(table=tables.conditioning_table(result))]),
     ]
     return render(
         Page(
@@ -74,10 +63,8 @@ def _key_figures(result: IdentificationDocument) -> Iterator[KeyFigure]:
     worst = max(range(len(ratios)), key=ratios.__getitem__)
     yield KeyFigure("Residual / noise", significant(ratios[worst], 3), f"at {result.joints[worst]}, the largest of all")
     yield KeyFigure("Condition number", significant(result.condition_number, 3), "of the unweighted regressor")
-    entries = (*result.conditioning, *result.held_out_conditioning)
-    yield KeyFigure(
-        "Samples", f"{sum(entry.samples for entry in entries):,}".replace(",", " "), f"{masked_samples(result)} masked"
-    )
+    samples = sum(entry.samples for entry in (*result.conditioning, *result.held_out_conditioning))
+    yield KeyFigure("Samples", f"{samples:,}".replace(",", " "), f"{masked_samples(result)} masked")
 
 
 def _fit_section(result: IdentificationDocument, identification: Identification) -> Section:
@@ -88,7 +75,7 @@ def _fit_section(result: IdentificationDocument, identification: Identification)
         f" ({noise_words(result.noise_method)})."
         " A joint at one has nothing but noise left.",
     )
-    return Section("fit", "Fit", [Part(figure=figure, table=fit_table(result, identification.robot))])
+    return Section("fit", "Fit", [Part(figure=figure, table=tables.fit_table(result, identification.robot))])
 
 
 def _torque_section(
@@ -101,7 +88,7 @@ def _torque_section(
         label = f"Torque of {name}, measured and predicted, and their difference"
         caption = f"{name}: torque at the recorded rate above, what the model leaves below; right, the shaded tenth."
         drawing = Drawing(svg, label, caption)
-        numbers = Numbers(f"Numbers of {name}", text=csv_text(torque_columns(series, joint)))
+        numbers = Numbers(f"Numbers of {name}", text=tables.csv_text(torque_columns(series, joint)))
         parts.append(Part(title=name, figure=drawing, numbers=numbers))
     length = series.time[-1] - series.time[0]
     shown = f"{series.recording}, {significant(length, 3)} s at {significant(series.rate_hz, 4)} Hz"
@@ -124,12 +111,12 @@ def _friction_section(
         " errors alone; the dots are the recordings' own: measured torque less that of the rigid body.",
     )
     curve_numbers = [
-        Part(numbers=Numbers(f"Numbers of {name}", text=csv_text(curve.columns)))
+        Part(numbers=Numbers(f"Numbers of {name}", text=tables.csv_text(curve.columns)))
         for name, curve in zip(result.joints, curves, strict=True)
     ]
-    parts = [Part(figure=figure), *curve_numbers, Part(table=friction_table(result), note=_FRICTION_EQUATION)]
+    parts = [Part(figure=figure), *curve_numbers, Part(table=tables.friction_table(result), note=_FRICTION_EQUATION)]
     if result.rotor_inertia:
-        parts.append(Part(title="Reflected rotor inertia", table=rotor_table(result)))
+        parts.append(Part(title="Reflected rotor inertia", table=tables.rotor_table(result)))
     return Section("friction", "Friction", parts)
 
 
@@ -142,7 +129,7 @@ def _parameter_section(result: IdentificationDocument) -> Section:
         svg = parameter_figure("parameters", known)
         parts.append(Part(figure=Drawing(svg, "Base parameters with their 95 % intervals", caption)))
     note = f"No motion of this arm shows {', '.join(result.unidentifiable)}." if result.unidentifiable else None
-    parts.append(Part(table=base_parameter_table(result), note=note))
+    parts.append(Part(table=tables.base_parameter_table(result), note=note))
     return Section("parameters", "Base parameters", parts)
 
 
@@ -151,4 +138,4 @@ def _link_section(result: IdentificationDocument) -> Section:
         "The most probable full parameter set: every pseudo-inertia positive definite, friction not negative."
         " Data determine their base parameters; the prior determines the rest of each."
     )
-    return Section("links", "Links", [Part(table=link_table(result))], [sentence])
+    return Section("links", "Links", [Part(table=tables.link_table(result))], [sentence])

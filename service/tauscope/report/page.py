@@ -117,10 +117,7 @@ class Page:
 
 
 def render(page: Page) -> str:
-    """The page as one HTML file that asks nothing of any network and runs no script.
-
-    All text is escaped; what no file could hold (control characters, broken Unicode of a file name) is spelled out.
-    """
+    """The page as one HTML file without scripts or requests, its text escaped, control characters spelled out."""
     environment = Environment(
         loader=PackageLoader("tauscope.report"), autoescape=True, undefined=StrictUndefined, finalize=_printable
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import PackageNotFoundError, version
 
-from tauscope.errors import RecordingError
+from tauscope.errors import RecordingError, explain_os_errors
 from tauscope.remote_files import copy_locally, find_path, is_folder, name_failures
 
 LIBRARIES = ("tauscope", "numpy", "scipy", "clarabel")  # packages whose version can change a figure
@@ -49,11 +49,9 @@ def installed_version(package: str) -> str:
 def input_files(role: str, path: str) -> Iterator[InputFile]:
     """The file of a path, or the files in it where it is a folder. Raises RecordingError where it cannot be read."""
     source = find_path(path)
-    try:
+    with explain_os_errors(RecordingError, f"{path}: cannot be read again for its hash"):
         files = sorted(entry for entry in source.iterdir() if entry.is_file()) if is_folder(source) else [source]
         for file in files:
             with name_failures(file), copy_locally(file) as copy, copy.open("rb") as opened:
                 digest = hashlib.file_digest(opened, "sha256").hexdigest()
             yield InputFile(role, str(file), file.stat().st_size, digest)
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be read again for its hash ({error.strerror or error})") from error

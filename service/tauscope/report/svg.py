@@ -21,16 +21,8 @@ HELD_OUT = "#009e73"
 # Colours to draw with, Okabe and Ito's; on the page each stands for a CSS variable (see `VARIABLES`).
 BAND = "#cfe3f1"
 
-VARIABLES = {
-    INK: "--ink",
-    MUTED: "--muted",
-    GRID: "--grid",
-    MEASURED: "--measured",
-    PREDICTED: "--predicted",
-    RESIDUAL: "--residual",
-    HELD_OUT: "--held-out",
-    BAND: "--band",
-}
+VARIABLES = {INK: "--ink", MUTED: "--muted", GRID: "--grid", BAND: "--band"}
+VARIABLES |= {MEASURED: "--measured", PREDICTED: "--predicted", RESIDUAL: "--residual", HELD_OUT: "--held-out"}
 
 WIDTH_INCHES = 9.2  # width of every figure: text of 8 pt is then as large as the page's small print
 
@@ -38,36 +30,19 @@ _STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "tauscope",
     "font.family": "DejaVu Sans",
-    "font.size": 8.0,
-    "text.color": INK,
-    "text.parse_math": False,
-    "axes.edgecolor": MUTED,
-    "axes.labelcolor": INK,
-    "axes.labelsize": 8.0,
     "axes.titlesize": 8.5,
     "axes.titlelocation": "left",
-    "axes.linewidth": 0.6,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
     "grid.color": GRID,
-    "grid.linewidth": 0.6,
-    "xtick.color": MUTED,
-    "ytick.color": MUTED,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "legend.frameon": False,
-    "legend.fontsize": 8.0,
     "lines.linewidth": 1.1,
     "lines.solid_joinstyle": "round",
-    "path.simplify": True,
     "path.simplify_threshold": 0.2,
-    "figure.facecolor": "none",
-    "axes.facecolor": "none",
-    "savefig.facecolor": "none",
+    **dict.fromkeys(("font.size", "axes.labelsize", "legend.fontsize"), 8.0),
+    **dict.fromkeys(("text.color", "axes.labelcolor", "xtick.labelcolor", "ytick.labelcolor"), INK),
+    **dict.fromkeys(("axes.edgecolor", "xtick.color", "ytick.color"), MUTED),
+    **dict.fromkeys(("axes.linewidth", "grid.linewidth", "xtick.major.width", "ytick.major.width"), 0.6),
+    **dict.fromkeys(("axes.grid", "axes.axisbelow", "path.simplify"), True),
+    **dict.fromkeys(("text.parse_math", "axes.spines.top", "axes.spines.right", "legend.frameon"), False),
+    **dict.fromkeys(("figure.facecolor", "axes.facecolor", "savefig.facecolor"), "none"),
 }
 
 _DRAWING = Lock()  # matplotlib's settings belong to the whole process; one figure at a time has them

@@ -33,18 +33,14 @@ def located_table(document: DiagnosisDocument) -> Table:
     """Where the mismatch is, joint by joint."""
     rows = []
     for entry in document.mismatch:
-        place, time = entry.where, entry.time
-        rows.append(
-            (
-                entry.joint,
-                "yes" if entry.significant else "no",
-                ABSENT if place is None else place.variable.replace("_", " "),
-                significant(entry.excess_rms, 3),
-                ABSENT if place is None else " … ".join(significant(value, 3) for value in place.range),
-                ABSENT if place is None else percent(place.share),
-                ABSENT if time is None else " … ".join(significant(value, 3) for value in time.range),
-            )
-        )
+        variable, span, share, time = [ABSENT] * 4
+        if entry.where is not None:
+            variable, share = entry.where.variable.replace("_", " "), percent(entry.where.share)
+            span = " … ".join(significant(value, 3) for value in entry.where.range)
+        if entry.time is not None:
+            time = " … ".join(significant(value, 3) for value in entry.time.range)
+        is_clear = "yes" if entry.significant else "no"
+        rows.append((entry.joint, is_clear, variable, significant(entry.excess_rms, 3), span, share, time))
     columns = ("joint", "more than noise", "concentrated in", "excess rms", "from … to", "share", "time [s]")
     return Table(columns, rows, words=3)
 

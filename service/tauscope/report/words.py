@@ -87,10 +87,7 @@ def masked_samples(document: IdentificationDocument) -> int:
 
 
 def noise_ratio(rms: float, noise_std: float) -> float:
-    """Residual in units of the noise.
-
-    `rms`: root mean square of the residual [Nm or N]; `noise_std`: standard deviation of the noise [Nm or N].
-    """
+    """Residual in units of the noise."""
     return rms / noise_std if noise_std > 0.0 else float("inf")
 
 

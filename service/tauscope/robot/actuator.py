@@ -14,11 +14,7 @@ GainUnit = Literal["register", "Nm_per_rad"]
 
 @dataclass(frozen=True)
 class Servo:
-    """Register conversion of a servo family.
-
-    `torque_per_volt`: stall torque over supply voltage in the data sheet [Nm/V]; None where the family has several
-        motors.
-    """
+    """Registers of a servo family; `torque_per_volt` at stall [Nm/V], None where it has several motors."""
 
     duty_per_rad: float  # duty of the bridge per unit of the P register and rad of position error [1/rad]
     max_duty: float = 1.0  # largest duty that the firmware gives, 0 to 1
@@ -49,16 +45,11 @@ class Actuator:
 
     Position: torque = κ clip(kp (qref - q), ±max_duty V) - kd q̇ - κ k_e q̇, in the units of `unit`.
     Velocity: kp acts on q̇ref - q̇.
-
-    `kd`: torque per velocity [Nm s/rad or N s/m]; a register's D has no documented unit and acts as viscous friction.
-    `temperature_slope`: relative loss of torque per volt with the recorded temperature, κ / (1 + slope (T - 25 °C))
-        [1/K].
-    `scale_std`: relative standard error of the torque per position error; None: that of a data sheet, or zero in SI.
     """
 
     kind: ActuatorKind
     kp: float = 0.0  # register value, or Nm/rad, N/m; of a velocity loop Nm s/rad, N s/m
-    kd: float = 0.0
+    kd: float = 0.0  # torque per velocity [Nm s/rad, N s/m]; a register's D has no known unit and is viscous friction
     unit: GainUnit = "Nm_per_rad"
     servo: str | None = None  # register conversion, one of `SERVOS`
     supply_voltage: float | None = None  # of the bridge [V]; a column ``volt`` goes before it
@@ -68,7 +59,9 @@ class Actuator:
     dead_band: float | None = None  # position error below which the bridge is off [rad]; None: the servo's own
     delay: float | None = None  # from the recorded command to its torque [s]; None: estimated
     rate_hz: float | None = None  # rate at which the loop takes commands [Hz]; None: with every sample
+    # relative loss of torque per volt with recorded T, κ / (1 + slope (T - 25 °C)) [1/K]
     temperature_slope: float = 0.0
+    # relative error of torque per position error; None: that of a data sheet, or zero in SI
     scale_std: float | None = None
 
     @property
@@ -116,14 +109,9 @@ class Actuator:
         kp: Values | None = None,
         temperature: Values | None = None,
     ) -> Values:
-        """Torque at the joint.
+        """Torque at the joint, (N,) as its arguments, by `error`, command less position, or less velocity `velocity`.
 
-        `error`: float or (N,), command less motion: of position [rad or m], of a velocity loop of velocity [rad/s or
-            m/s].
-        `velocity`: float or (N,), q̇ [rad/s or m/s].
-        `voltage`: float or (N,), supply [V]; None: as stated.
-        `kp`: float or (N,), gain in force; None: as stated.
-        `temperature`: float or (N,), of the motor [°C]; None or NaN: 25.
+        `voltage` [V] and gain `kp` are as stated where None, the motor's `temperature` [°C] 25 where None or NaN.
         """
         dead = self.conversion.dead_band if self.dead_band is None and self.unit == "register" else self.dead_band
         gain = self.kp if kp is None else kp

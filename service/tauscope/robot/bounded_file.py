@@ -7,12 +7,7 @@ from tauscope.errors import RobotFileError
 
 
 def read_bounded(path: Path, limit: int) -> bytes:
-    """All bytes of a regular file of at most `limit` bytes.
-
-    Raises RobotFileError if the file is missing, not a regular file, empty, too large or not readable.
-
-    `limit`: largest size that is accepted [bytes].
-    """
+    """All bytes of a regular file. Raises RobotFileError where it is none, empty, too large or not readable."""
     try:
         mode, data = path.stat().st_mode, None
         if stat.S_ISREG(mode):  # a pipe or a device might never end

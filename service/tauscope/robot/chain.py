@@ -18,10 +18,7 @@ MOST_NAMES = 4  # names that a note lists
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Joints, segments and bodies from the base to the tip.
-
-    `links`: one a segment, about the link frame; zero for a link without inertia, None where no link has one.
-    """
+    """Joints, segments and bodies from the base to the tip."""
 
     base: str
     tip: str
@@ -30,6 +27,7 @@ class Chain:
     segment_names: tuple[str, ...]  # the file's joint of each segment
     segments: tuple[Segment, ...]  # one a joint, and one for each joint that follows another
     limits: tuple[JointLimits, ...]
+    # one a segment, about the link frame; zero without inertia, None where no link has any
     links: tuple[LinkInertia, ...] | None
     friction: tuple[FrictionCoefficients, ...] | None  # one a joint; None where no joint states it
     rotor_inertia: tuple[float, ...] | None  # one a joint [kg m² or kg]; None where no joint states it
@@ -52,20 +50,16 @@ class Master:
 
 
 class ChainMotion:
-    """Which joints of a chain move, and how.
-
-    `moving`: base first, those that are their own masters, and those that follow one of them.
-    `independent`: those that the others follow, in the order in which they first move the chain.
-    `couplings`: of each that moves; None where it is the next one itself.
-    """
+    """Which joints of a chain move, and how."""
 
     def __init__(self, masters: Mapping[str, Master | None]) -> None:
         """Take the joints of a chain that are not held, base first, and what each follows."""
         every = {name: master or Master(name) for name, master in masters.items()}
         own = {name for name, master in masters.items() if master is None}
+        # Base first, those that are their own masters, and those that follow one of them.
         self.moving = {name: master for name, master in every.items() if master.joint in own}
         self.independent = tuple(dict.fromkeys(master.joint for master in self.moving.values()))
-        self.couplings: dict[str, Coupling | None] = {}
+        self.couplings: dict[str, Coupling | None] = {}  # None of one that is the next one itself
         met: set[str] = set()
         for name, master in self.moving.items():
             is_next = master.joint not in met and (master.multiplier, master.offset) == (1.0, 0.0)
@@ -74,11 +68,7 @@ class ChainMotion:
             met.add(master.joint)
 
     def friction(self, stated: Mapping[str, tuple[float, float]]) -> tuple[FrictionCoefficients, ...]:
-        """Friction of the independent joints, from dry friction and damping of each that moves.
-
-        A joint that follows with multiplier m brakes its master with |m| times its dry friction and m² times its
-        damping.
-        """
+        """Friction of independent joints: one that follows adds |m| times its dry friction, m² times its damping."""
         total = {name: np.zeros(2) for name in self.independent}
         for name, (dry, damping) in stated.items():
             master = self.moving[name]
@@ -98,11 +88,7 @@ def default_ends_note(label: str, kind: str, base: str, tip: str, joints: Sequen
 
 
 def rigid_branch_note(label: str, joints: Sequence[str], mass: float, following: Sequence[str] = ()) -> ResultWarning:
-    """Which joints beside the chain count as rigid, and what they carry.
-
-    `mass`: of all bodies that these joints move [kg]; `following`: those of them that would follow a joint of the
-    chain.
-    """
+    """Which joints beside the chain count as rigid, the `mass` that they move [kg], and who would follow it."""
     more = f" and {len(joints) - MOST_NAMES} more" if len(joints) > MOST_NAMES else ""
     names = ", ".join(map(shown, joints[:MOST_NAMES])) + more
     verbs = ("moves", "counts") if len(joints) == 1 else ("move", "count")

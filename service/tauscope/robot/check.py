@@ -10,7 +10,7 @@ from tauscope.robot.kinematics import homogeneous
 from tauscope.robot.messages import Finding, Severity
 from tauscope.robot.robot import Joint, JointLimits, JointType, Robot, Segment
 from tauscope.robot.robot_file import read_robot
-from tauscope.strict_model import entry
+from tauscope.strict_model import entry, take_fields
 
 EARTH = (9.7, 9.9)  # acceleration of gravity on the ground, with room for altitude and latitude [m/s²]
 
@@ -45,10 +45,7 @@ class RobotReport:
 
 
 def check_robot(path: Path | str, *, expands_xacro: bool = True) -> RobotReport:
-    """The report on a robot file, read as `read_robot` does; links that no body can be are among its findings.
-
-    Raises RobotFileError if the file or its URDF cannot be read or is not valid.
-    """
+    """Report on a robot file, impossible links included. Raises RobotFileError where it cannot be read."""
     robot = read_robot(path, expands_xacro=expands_xacro)
     rank = list(Severity)
     findings = sorted((*robot.findings, *_remarks(robot, str(path))), key=lambda finding: rank.index(finding.severity))
@@ -67,19 +64,15 @@ def check_robot(path: Path | str, *, expands_xacro: bool = True) -> RobotReport:
 
 def _summary(number: int, joint: Joint, segment: Segment, mass: float | None) -> JointSummary:
     before, after = segment.before, segment.after
-    return JointSummary(
+    return take_fields(
+        JointSummary,
+        joint,
         number=number,
-        name=joint.name,
-        type=joint.type,
-        limits=joint.limits,
-        gear_ratio=joint.gear_ratio,
-        torque_constant=joint.torque_constant,
-        sign=joint.sign,
         origin=_triple(before.translation + before.rotation @ after.translation),
         axis=_triple(before.rotation[:, 2]),
         mass=mass,
-        before=tuple(float(value) for value in homogeneous(before).ravel()),
-        after=tuple(float(value) for value in homogeneous(after).ravel()),
+        before=tuple(homogeneous(before).ravel().tolist()),
+        after=tuple(homogeneous(after).ravel().tolist()),
     )
 
 
@@ -92,9 +85,8 @@ def _remarks(robot: Robot, source: str) -> Iterator[Finding]:
         yield Finding(Severity.WARNING, repair.place, f"{repair.text}; {repair.remedy}")
     size = float(np.linalg.norm(robot.gravity))
     if not EARTH[0] <= size <= EARTH[1]:
-        yield Finding(
-            Severity.WARNING, f"{source}: gravity", f"is {size:g} m/s², not 9.81: is the arm's weight balanced?"
-        )
+        text = f"is {size:g} m/s², not 9.81: is the arm's weight balanced?"
+        yield Finding(Severity.WARNING, f"{source}: gravity", text)
     for key in ("position", "velocity"):
         without = [joint.name for joint in robot.joints if getattr(joint.limits, key) is None]
         if without:
@@ -111,5 +103,4 @@ def _remarks(robot: Robot, source: str) -> Iterator[Finding]:
 
 
 def _triple(vector: np.ndarray) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in vector)
-    return (x, y, z)
+    return tuple(vector.tolist())

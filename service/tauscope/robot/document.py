@@ -66,7 +66,9 @@ class DocumentOrigin:
 
     def where(self, place: Place) -> str:
         """Where an entry stands, as ``arm.yaml:12: joints[2].limits.position (joint 3, 'wrist')``."""
-        line = self._line(place)
+        # Of an entry that is missing, the line of the nearest mapping that should hold it.
+        known = (place[:length] for length in range(len(place), -1, -1))
+        line = next((self.lines[above] for above in known if above in self.lines), None)
         path = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in place).lstrip(".")
         parts = [self.label if line is None else f"{self.label}:{line}"]
         if path:
@@ -86,13 +88,6 @@ class DocumentOrigin:
         except ValidationError as error:
             place, text = first_fault(error)
         raise self.error(place, text)
-
-    def _line(self, place: Place) -> int | None:
-        """Line of an entry, or of the nearest mapping that should hold it."""
-        for length in range(len(place), -1, -1):
-            if place[:length] in self.lines:
-                return self.lines[place[:length]]
-        return None
 
     def _joint(self, place: Place) -> str:
         """The joint or link that an entry is about, numbered from 1, with its name where the document gives one."""
@@ -220,10 +215,7 @@ class JointDocument(Document):
 
 
 class InertiaDocument(Document):
-    """The six entries of an inertia matrix about the link frame's origin.
-
-    `xx`, `yy`, `zz`, `xy`, `xz`, `yz`: entries [kg m²].
-    """
+    """The six entries of an inertia matrix about the link frame's origin [kg m²]."""
 
     xx: Number
     yy: Number
@@ -250,10 +242,7 @@ class FrictionDocument(Document):
 
 
 class ModelDocument(Document):
-    """What the user's simulation believes.
-
-    `rotor_inertia`: reflected to the joint, one a joint [kg m² or kg].
-    """
+    """What the user's simulation believes; `rotor_inertia` is reflected to the joint [kg m² or kg]."""
 
     links: list[LinkDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)
     friction: list[FrictionDocument] | None = Field(default=None, min_length=1, max_length=MOST_JOINTS)

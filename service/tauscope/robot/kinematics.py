@@ -14,39 +14,24 @@ def compose(first: Placement, second: Placement) -> Placement:
     return Placement(first.rotation @ second.rotation, first.translation + first.rotation @ second.translation)
 
 
-def rotation_about_x(angle: float) -> Array:
-    """Rotation matrix about x, shape (3, 3). `angle`: [rad]."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-
-
-def rotation_about_y(angle: float) -> Array:
-    """Rotation matrix about y, shape (3, 3). `angle`: [rad]."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-
-
-def rotation_about_z(angle: float) -> Array:
-    """Rotation matrix about z, shape (3, 3). `angle`: [rad]."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+def rotation_about(axis: int, angle: float) -> Array:
+    """Rotation matrix about x (0), y (1) or z (2), shape (3, 3). `angle`: [rad]."""
+    matrix, first, second = np.eye(3), (axis + 1) % 3, (axis + 2) % 3
+    matrix[first, first] = matrix[second, second] = np.cos(angle)
+    matrix[second, first] = np.sin(angle)
+    matrix[first, second] = -matrix[second, first]
+    return matrix
 
 
 def rotation_of_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Array:
-    """The URDF's fixed-axis angles: R = Rz(yaw) Ry(pitch) Rx(roll), shape (3, 3).
-
-    `roll`: about x [rad]; `pitch`: about y [rad]; `yaw`: about z [rad].
-    """
-    return rotation_about_z(yaw) @ rotation_about_y(pitch) @ rotation_about_x(roll)
+    """The URDF's fixed-axis angles [rad]: R = Rz(yaw) Ry(pitch) Rx(roll), shape (3, 3)."""
+    return rotation_about(2, yaw) @ rotation_about(1, pitch) @ rotation_about(0, roll)
 
 
 def rotation_of_z_to(axis: Array) -> Array:
-    """A rotation that carries z to an axis: R [0, 0, 1]ᵀ = axis, shape (3, 3).
+    """A rotation (3, 3) that carries z to the unit vector `axis`, (3,): Rodrigues' R = 1 + [v] + [v]²/(1 + c).
 
-    Rodrigues' formula R = 1 + [v] + [v]²/(1 + c) with v = z × axis, c = z·axis. Where the axis points down, 1 + c loses
-    its digits: there z is carried to -axis, after half a turn about x.
-
-    `axis`: (3,), unit vector.
+    v = z × axis, c = z·axis. Where the axis points down, 1 + c loses its digits: half a turn about x comes first.
     """
     if axis[2] < 0.0:
         return rotation_of_z_to(-axis) @ np.diag([1.0, -1.0, -1.0])
@@ -65,7 +50,7 @@ def joint_displacement(kind: JointType, axis: Array, position: float) -> Placeme
     if kind is JointType.PRISMATIC:
         return Placement(translation=position * axis)
     align = rotation_of_z_to(axis)
-    return Placement(align @ rotation_about_z(position) @ align.T)
+    return Placement(align @ rotation_about(2, position) @ align.T)
 
 
 @dataclass(frozen=True)
@@ -91,21 +76,18 @@ def modified_segments(rows: Sequence[DenavitHartenbergRow]) -> tuple[Segment, ..
 
 def _along_z(row: DenavitHartenbergRow) -> Placement:
     """Rz(θ) Tz(d)."""
-    return Placement(rotation_about_z(row.theta), np.array([0.0, 0.0, row.d]))
+    return Placement(rotation_about(2, row.theta), np.array([0.0, 0.0, row.d]))
 
 
 def _along_x(row: DenavitHartenbergRow) -> Placement:
     """Tx(a) Rx(α), which commute."""
-    return Placement(rotation_about_x(row.alpha), np.array([row.a, 0.0, 0.0]))
+    return Placement(rotation_about(0, row.alpha), np.array([row.a, 0.0, 0.0]))
 
 
 def link_placements(chain: Robot | Sequence[Segment], q: Array) -> Array:
-    """Every link frame seen from the base: T_j = T_{j-1} · before_j · motion_z(q_j) · after_j.
+    """Link frames seen from the base, (N, m, 4, 4), T_j = T_{j-1} · before_j · motion_z(q_j) · after_j, by `q`, (N, n).
 
-    Raises RecordingMismatchError if `q` has not one column a joint.
-
-    `chain`: the arm, or its segments, base first; `q`: (N, n), joint position [rad or m]. Returns (N, m, 4, 4),
-    homogeneous transforms; [:, j] is link frame j + 1 in the base frame [m].
+    Raises RecordingMismatchError for another number of joints.
     """
     segments = chain.segments if isinstance(chain, Robot) else tuple(chain)
     position = np.asarray(q, dtype=np.float64)

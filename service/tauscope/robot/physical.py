@@ -28,10 +28,7 @@ def pseudo_inertia(link: LinkInertia) -> Array:
 
 
 def find_defect(link: LinkInertia, tolerance: float = ROUNDING) -> str | None:
-    """Why no rigid body has these parameters; None where a body can have them.
-
-    `tolerance`: violation that is allowed, relative to the largest entry of the inertia.
-    """
+    """Why no rigid body has these parameters, by more than a share of its largest inertia; None where one can."""
     offset = float(np.linalg.norm(link.first_moment))
     if link.mass < 0.0:
         return f"mass {link.mass:g} kg is negative"
@@ -55,9 +52,8 @@ def find_defect(link: LinkInertia, tolerance: float = ROUNDING) -> str | None:
 def nearest_body(link: LinkInertia) -> LinkInertia:
     """The nearest body; the link itself where a body can have its parameters.
 
-    min ‖A⁻¹ (J - J₀) A⁻ᵀ‖_F over J ⪰ 0, J the pseudo-inertia and A Aᵀ that of a compact body about the same centre of
-    mass: negative eigenvalues of A⁻¹ J₀ A⁻ᵀ become zero (Higham 1988). A positive mass and its centre stay. The answer
-    does not depend on units or on the frame. Without a mass that tells the centre, A is a body at the frame's origin.
+    min ‖A⁻¹ (J - J₀) A⁻ᵀ‖_F over J ⪰ 0, A Aᵀ the pseudo-inertia of a compact body about the same centre of mass, or
+    without a mass at the origin: negative eigenvalues of A⁻¹ J₀ A⁻ᵀ become zero (Higham 1988), mass and centre stay.
     """
     if find_defect(link, ROUND_OFF) is None:
         return link
@@ -91,10 +87,7 @@ def repair_text(stated: LinkInertia, body: LinkInertia) -> str | None:
 
 
 def about_centre(link: LinkInertia) -> Array:
-    """Inertia about the centre of mass: I_c = I - (hᵀh 1 - h hᵀ)/m, equation (5) reversed; I itself without mass.
-
-    Returns (3, 3), I_c [kg m²].
-    """
+    """Inertia about the centre of mass, (3, 3): I_c = I - (hᵀh 1 - h hᵀ)/m, (5) reversed; I without mass."""
     if link.mass == 0.0:
         return link.inertia
     moment = link.first_moment

@@ -33,27 +33,20 @@ _GROUPS = "t, q, tau, i, qd, qdd, qref, taucmd, temp, qlink, volt, kp, period"
 
 @dataclass(frozen=True)
 class RecordingLayout:
-    """Columns, units and separators of a recording.
+    """Columns, units and separators of a recording."""
 
-    `columns`: where the columns of CONTRACT.md are found, by column (``q3``) or for all joints (``q``).
-    `units`: unit of ``t``, ``q``, ``qd``, ``tau``, or of one joint's column, ``q3``.
-    `rate_hz`: samples a second where t counts samples [Hz].
-    `decimal`, `delimiter`: None where the file shows them.
-    """
-
+    # unit of ``t``, ``q``, ``qd``, ``tau``, or of one joint's column, ``q3``
     units: Mapping[str, str] = field(default_factory=dict)
-    rate_hz: float | None = None
+    rate_hz: float | None = None  # samples a second where t counts samples [Hz]
+    # where the columns of CONTRACT.md are, by column (``q3``) or for all joints
     columns: Mapping[str, Source] | str | None = None
-    decimal: str | None = None
-    delimiter: str | None = None
+    decimal: str | None = None  # None where the file shows it
+    delimiter: str | None = None  # None where the file shows it
     topic: str | None = None  # of a log with several topics
 
 
 def find_fault(units: Mapping[str, str], rate_hz: float | None) -> tuple[str, str] | None:
-    """The column, or ``rate_hz``, whose unit cannot be used, and the reason; None where all can be.
-
-    `rate_hz`: samples a second [Hz].
-    """
+    """The column, or ``rate_hz``, whose unit cannot be used, and the reason; None where all can be."""
     for column, unit in units.items():
         match = _COLUMN.fullmatch(column)
         if match is None or (match[1] in ("t", "tau") and match[2]):

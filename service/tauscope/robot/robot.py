@@ -137,11 +137,7 @@ class LinkInertia:
 
 @dataclass(frozen=True, eq=False)
 class Repair:
-    """Stated inertial parameters that no body has, and the nearest body, which the model holds instead.
-
-    `link`: index of the link that the body belongs to, from 0.
-    `before`, `after`: of the body, in the frame of that link.
-    """
+    """Stated parameters that no body has, of a link from 0; `before`, `after` the nearest body, in its frame."""
 
     link: int
     place: str
@@ -171,25 +167,20 @@ class Model:
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A robot arm as its robot file describes it.
-
-    `gravity`: (3,), acceleration of gravity in the base frame [m/s²].
-    `segment_names`: joint of the URDF or MJCF that each segment is; empty without such a file, as are the next two.
-    `branches`: the part of each link that an export leaves where the file has it: of a URDF the bodies on joints beside
-        the chain, of an MJCF all but the body of the joint.
-    """
+    """A robot arm as its robot file describes it."""
 
     name: str
     joints: tuple[Joint, ...]  # base first
     segments: tuple[Segment, ...]  # base first; one a joint, and one for each joint that follows another
+    # (3,), acceleration in the base frame [m/s²]
     gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
     model: Model = Model()
     source: Path | None = None
     urdf: Path | None = None
     mjcf: Path | None = None
-    segment_names: tuple[str, ...] = ()
+    segment_names: tuple[str, ...] = ()  # of the URDF's or MJCF's joint that each segment is; empty without such a file
     link_names: tuple[tuple[str, ...], ...] = ()  # links of that file that make up each link
-    branches: tuple[LinkInertia, ...] = ()
+    branches: tuple[LinkInertia, ...] = ()  # the part of each link that an export leaves where the file has it
     findings: tuple[Finding, ...] = ()
     notes: tuple[ResultWarning, ...] = ()
     repairs: tuple[Repair, ...] = ()

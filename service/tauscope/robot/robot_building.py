@@ -60,13 +60,9 @@ def read_mjcf_chain(
     tip: str | None = None,
     locked: Mapping[str, float] | None = None,
 ) -> Chain:
-    """The chain from body `base` to body `tip` of an MJCF; by default from the root to the deepest body.
+    """The chain from body `base` to `tip` of an MJCF, by default from root to deepest; `locked`: positions [rad or m].
 
-    Raises RobotFileError if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip. Raises
-    MissingExtraError where MuJoCo is not installed.
-
-    `path`: where the file lies, for the files that it names; None for text without files beside it; `locked`: position
-    of joints that do not move [rad or m].
+    Raises RobotFileError without a chain of hinges and slides, MissingExtraError without MuJoCo.
     """
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         with require_extra(f"{label}: reading an MJCF"):
@@ -110,21 +106,20 @@ class _Kinematics:
 
 
 def build_robot(document: RobotDocument, origin: DocumentOrigin, file_source: FileSource) -> Robot:
-    """The robot of a document; a link of its model that no body can be is replaced by the nearest body.
-
-    Raises RobotFileError if parts of the document do not fit each other, or the URDF is not valid.
-    """
+    """The robot of a document, impossible links replaced by the nearest body. Raises RobotFileError."""
     kinematics = _kinematics(document, origin, file_source)
     chain = kinematics.chain
     findings: list[Finding] = [*(chain.findings if chain else ())]
     joints = _joints(document.joints, kinematics, origin)
     model, repairs = _model(document.model, kinematics, origin, findings)
-    layout = document.recording
+    layout, gravity = document.recording, EARTH if chain is None or chain.gravity is None else chain.gravity
+    if document.gravity is not None:
+        gravity = np.array(document.gravity)
     return Robot(
         name=document.name,
         joints=joints,
         segments=kinematics.segments,
-        gravity=_gravity(document, chain),
+        gravity=gravity,
         model=model,
         urdf=kinematics.path if kinematics.key == "urdf" else None,
         mjcf=kinematics.path if kinematics.key == "mjcf" else None,
@@ -136,13 +131,6 @@ def build_robot(document: RobotDocument, origin: DocumentOrigin, file_source: Fi
         repairs=repairs,
         recording=RecordingLayout() if layout is None else layout.layout,
     )
-
-
-def _gravity(document: RobotDocument, chain: Chain | None) -> np.ndarray:
-    """Gravity in the base frame, (3,) [m/s²]: as the robot file says, else as its MJCF."""
-    if document.gravity is not None:
-        return np.array(document.gravity)
-    return EARTH if chain is None or chain.gravity is None else chain.gravity
 
 
 def _kinematics(document: RobotDocument, origin: DocumentOrigin, file_source: FileSource) -> _Kinematics:
@@ -251,20 +239,15 @@ def _links(
 ) -> tuple[tuple[LinkInertia, ...], tuple[Repair, ...]]:
     links, repairs = [], []
     for index, document in enumerate(documents):
-        stated, place = _link(document), origin.where(("model", "links", index))
+        i = document.inertia
+        entries = [i.xx, i.yy, i.zz, i.xy, i.xz, i.yz, document.mass, *document.first_moment]
+        stated, place = LinkInertia.from_vector(np.array(entries)), origin.where(("model", "links", index))
         links.append(nearest_body(stated))
         if text := repair_text(stated, links[index]):
             repairs.append(Repair(index, place, text, REPAIR_REMEDY, stated, links[index]))
         elif stated.mass == 0.0 and np.any(stated.inertia):
             findings.append(Finding(Severity.WARNING, place, "has inertia but no mass, as no body has; add the mass"))
     return tuple(links), tuple(repairs)
-
-
-def _link(document: LinkDocument) -> LinkInertia:
-    i = document.inertia
-    return LinkInertia.from_vector(
-        np.array([i.xx, i.yy, i.zz, i.xy, i.xz, i.yz, document.mass, *document.first_moment])
-    )
 
 
 def _check_count(origin: DocumentOrigin, place: tuple[str, ...], found: int, count: int, key: str) -> None:

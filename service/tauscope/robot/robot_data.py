@@ -11,10 +11,7 @@ from tauscope.robot.robot_building import SourceFile, build_robot
 
 
 def robot_from_dict(data: Mapping[str, Any], label: str = "robot") -> Robot:
-    """The robot of plain data: the robot file's form, or that of `robot_to_dict`. No file is opened.
-
-    Raises RobotFileError if the data are not valid, or name a file; one line naming the JSON path and joint.
-    """
+    """The robot of plain data, no file opened. Raises RobotFileError, which names the JSON path and joint."""
     origin = DocumentOrigin(label, data)
 
     def refuse(kind: str, file: str) -> SourceFile:
@@ -25,10 +22,7 @@ def robot_from_dict(data: Mapping[str, Any], label: str = "robot") -> Robot:
 
 
 def robot_to_dict(robot: Robot) -> dict[str, Any]:
-    """Everything that computing with the robot needs, as plain data without files beside it.
-
-    `robot_from_dict` gives the same robot back, but for paths of files, names of links, notes, findings and repairs.
-    """
+    """All that computing with the robot needs, for `robot_from_dict`, without paths, names of links and findings."""
     data: dict[str, Any] = {
         "name": robot.name,
         "kinematics": {"segments": [_segment(segment) for segment in robot.segments]},

@@ -26,13 +26,9 @@ KINEMATICS_OF_ROOT = {"robot": "urdf", "mujoco": "mjcf"}  # kinds of kinematics 
 
 
 def read_robot(path: Path | str, *, expands_xacro: bool = True) -> Robot:
-    """The robot that a robot file describes, or a URDF or MJCF by itself.
+    """The robot of a robot file, or a URDF or MJCF by itself. Raises RobotFileError: file, line, place, joint.
 
-    `expands_xacro`: whether the command ``xacro`` may read it, which evaluates Python and opens any file: never for a
-    file of strangers.
-
-    Raises RobotFileError if the file or the one that it names cannot be read or is not valid; one line naming file,
-    line, place and joint.
+    `expands_xacro`: whether the command ``xacro`` may read it, which opens any file: never for strangers' files.
     """
     source = find_path(path)
     data = read_bounded(source, LARGEST_XML)
@@ -69,10 +65,7 @@ def _expand(file: SourceFile) -> SourceFile:
 
 
 def parse_robot_file(data: bytes, label: str) -> tuple[RobotDocument, DocumentOrigin]:
-    """The validated document of a robot file's bytes, and where it came from.
-
-    Raises RobotFileError if the bytes are not the YAML of a robot file, nor a URDF or MJCF.
-    """
+    """Document and source of a robot file's bytes. Raises RobotFileError where they are none, nor URDF or MJCF."""
     if is_xml(data):
         origin = DocumentOrigin(label, describe_bare_file(data, label))
         return origin.validate(RobotDocument), origin
@@ -84,10 +77,7 @@ def parse_robot_file(data: bytes, label: str) -> tuple[RobotDocument, DocumentOr
 
 
 def describe_bare_file(data: bytes, label: str) -> dict[str, Any]:
-    """The robot file that says the same as a URDF or MJCF by itself: base and tip by default.
-
-    Raises RobotFileError if the file is neither.
-    """
+    """The robot file of a URDF or MJCF by itself. Raises RobotFileError where it is neither."""
     root = parse_xml(data, label, [])
     kind, file = KINEMATICS_OF_ROOT.get(local_name(root)), Path(label).name
     if kind is None:
@@ -105,11 +95,7 @@ INLINE = "{"  # first sign of a mapping that stands in place of a file's name
 
 
 def read_layout(text: str) -> RecordingLayout:
-    """The layout that a preset, a file or a mapping in YAML's flow style names.
-
-    A file holds the block, with or without the key ``recording``, or the columns alone. Raises RobotFileError where it
-    is neither a preset nor a file, or not valid.
-    """
+    """The layout that a preset, a file or YAML in flow style names. Raises RobotFileError where it is none of them."""
     if text in PRESETS:
         return RecordingLayout(columns=text)
     if text.startswith(INLINE):
@@ -128,10 +114,7 @@ def parse_layout(text: str, label: str) -> RecordingLayout:
 
 
 def layout_from_dict(data: Any, label: str = "columns", lines: Mapping[Place, int] | None = None) -> RecordingLayout:
-    """The layout of plain data: the block ``recording``, that block in a mapping, or its columns alone.
-
-    Raises RobotFileError where it is not valid.
-    """
+    """The layout of a block ``recording``, within a mapping or not, or of its columns. Raises RobotFileError."""
     lines = lines or {}
     if not isinstance(data, Mapping):
         raise RobotFileError(f"{label}: must be a mapping, as {{t: time, q: 'position_{{1}}', …}}")

@@ -24,17 +24,13 @@ from tauscope.robot.kinematics import compose, joint_displacement, rotation_of_z
 from tauscope.robot.messages import Finding, Severity, nearest, shown
 from tauscope.robot.robot import FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
 from tauscope.robot.urdf_element import Element, number, only_child, origin, urdf_error, vector, where
-from tauscope.robot.urdf_inertia import lumped_inertia, stated_mass
-from tauscope.robot.urdf_xml import UrdfJoint, UrdfTree, parse_urdf
+from tauscope.robot.urdf_xml import UrdfJoint, UrdfTree, lumped_inertia, parse_urdf, stated_mass
 
 MOVING = frozenset({"revolute", "continuous", "prismatic"})
 
 
 class JointMotions:
-    """How the joints of a URDF move, where some of them are locked.
-
-    `locked`: position by the name of a joint [rad or m].
-    """
+    """How the joints of a URDF move, some `locked` at a position by their names [rad or m]."""
 
     def __init__(self, tree: UrdfTree, locked: Mapping[str, float], path: Iterable[UrdfJoint]) -> None:
         self._tree, self._locked = tree, locked
@@ -119,12 +115,7 @@ class _Body:
 def read_urdf_chain(
     data: bytes, label: str, base: str | None = None, tip: str | None = None, locked: Mapping[str, float] | None = None
 ) -> Chain:
-    """The chain from link `base` to link `tip`; by default from the root to the deepest leaf.
-
-    Raises RobotFileError if the URDF is not valid, or no chain of movable joints runs from base to tip.
-
-    `locked`: position of joints that do not move [rad or m].
-    """
+    """The chain from link `base` to `tip`, by default from the root to the deepest leaf. Raises RobotFileError."""
     findings: list[Finding] = []
     tree = parse_urdf(data, label, findings)
     is_default = base is None or tip is None

@@ -51,12 +51,7 @@ def only_child(label: str, element: Element, kind: str, findings: list[Finding])
 
 
 def number(label: str, element: Element, key: str, default: float | None = None) -> float:
-    """A finite number in an attribute.
-
-    Raises RobotFileError if the attribute is missing or not a finite number.
-
-    `default`: value where the attribute is absent; None where it must be there.
-    """
+    """A finite number in an attribute, or `default` where it is absent. Raises RobotFileError."""
     text = element.get(key)
     if text is None:
         if default is None:
@@ -66,20 +61,12 @@ def number(label: str, element: Element, key: str, default: float | None = None)
 
 
 def bounded_number(label: str, element: Element, key: str) -> float:
-    """A number in an attribute that must be there, of a size that SI quantities of an arm have.
-
-    Raises RobotFileError if the attribute is missing, not a number or beyond 1e9.
-    """
+    """A number in an attribute that must be there. Raises RobotFileError beyond 1e9, or where there is none."""
     return _require_bounded(label, element, key, number(label, element, key))
 
 
 def vector(label: str, element: Element | None, key: str, default: tuple[float, float, float]) -> NDArray[np.float64]:
-    """Three numbers in an attribute, shape (3,).
-
-    Raises RobotFileError if the attribute does not hold three numbers.
-
-    `element`: the element; None where the whole element is absent.
-    """
+    """Three numbers in an attribute, shape (3,); `element` is None where it is absent. Raises RobotFileError."""
     text = None if element is None else element.get(key)
     if text is None:
         return np.array(default)

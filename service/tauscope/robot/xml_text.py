@@ -6,6 +6,7 @@ namespaces. Any other fault of the text is refused by line.
 
 import codecs
 import re
+from typing import Any
 
 from lxml import etree
 
@@ -33,26 +34,14 @@ def is_xml(data: bytes) -> bool:
 
 
 def parse_xml(data: bytes, label: str, findings: list[Finding]) -> Element:
-    """The root element.
-
-    Raises RobotFileError if the text is not well-formed or holds a DOCTYPE, which is refused before entities can be
-    expanded.
-    """
+    """The root element. Raises RobotFileError where it is not well-formed, or holds a DOCTYPE with its entities."""
     text = decode_xml(data, label, findings)
     doctype = text.find("<!DOCTYPE")
     if doctype >= 0:
         line = text.count("\n", 0, doctype) + 1
         raise RobotFileError(f"{label}:{line}: a DOCTYPE is not accepted in a robot description; remove it")
-    parser = etree.XMLParser(
-        encoding="utf-8",
-        resolve_entities=False,
-        no_network=True,
-        load_dtd=False,
-        huge_tree=False,
-        remove_comments=True,
-        remove_pis=True,
-        recover=True,
-    )
+    closed: dict[str, Any] = {"resolve_entities": False, "no_network": True, "load_dtd": False, "huge_tree": False}
+    parser = etree.XMLParser(encoding="utf-8", remove_comments=True, remove_pis=True, recover=True, **closed)
     try:
         root = etree.fromstring(text.encode("utf-8"), parser)
     except etree.XMLSyntaxError as error:
@@ -68,10 +57,7 @@ def parse_xml(data: bytes, label: str, findings: list[Finding]) -> Element:
 
 
 def decode_xml(data: bytes, label: str, findings: list[Finding]) -> str:
-    """Text of a file by its byte order mark, as UTF-8, as its declaration says, or else as Latin-1, with a finding.
-
-    Raises RobotFileError if the bytes are no text.
-    """
+    """Text by byte order mark, as UTF-8, by its declaration, or as Latin-1 with a finding. Raises RobotFileError."""
     declared = _DECLARATION.match(data[:200])
     marked = _marked_encoding(data)
     stated = None if declared is None else declared[1].decode("ascii")

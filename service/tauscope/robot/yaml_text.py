@@ -59,10 +59,7 @@ class _BoundedComposer(Composer):
 
 
 def read_yaml(text: str, label: str) -> YamlContent:
-    """Plain data of one YAML document.
-
-    Raises RobotFileError if the text is not one well-formed YAML document of plain data.
-    """
+    """Plain data of one YAML document. Raises RobotFileError where it is not one, well-formed."""
     root = _compose(text, label)
     if root is None:
         raise RobotFileError(f"{label}: the file holds no entries")
@@ -139,18 +136,10 @@ class _PlainBuilder:
             if kind == "int":
                 return int(text.replace("_", ""), 0)  # what YAML 1.1 and 1.2 read differently is refused: 010, 1:30
             if kind == "float":
-                return _real(text)
+                return float(text.replace("_", "").lower().replace(".inf", "inf").replace(".nan", "nan"))
         except ValueError:
             raise self._error(line, f"{shown(text)} cannot be read as a number; write it plainly, as 12.5") from None
         raise self._error(line, f"the tag {shown(str(node.tag))} is not accepted; write plain data")
 
     def _error(self, line: int, text: str) -> RobotFileError:
         return RobotFileError(f"{self.label}:{line}: {text}")
-
-
-def _real(text: str) -> float:
-    """The float of a YAML scalar, `.inf` and `.nan` included: which field may not be so is for the field to say."""
-    plain = text.replace("_", "").lower()
-    if plain.lstrip("+-") in {".inf", ".nan"}:
-        return float(plain.replace(".", ""))
-    return float(plain)

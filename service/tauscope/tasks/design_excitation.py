@@ -1,23 +1,13 @@
 """Design an excitation: the motion that tells most about an arm."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, FiniteFloat
 
-from tauscope.excitation import (
-    Box,
-    ColumnScaling,
-    Criterion,
-    ExcitationDesign,
-    ExcitationOptions,
-    OptimiserProgress,
-    Workspace,
-    design_excitation,
-    excitation_document,
-)
+from tauscope import excitation
 from tauscope.robot import Robot, read_robot
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.task import Files, Outputs, Progress, json_text
@@ -73,24 +63,18 @@ class ExcitationDesignOptions(StrictModel):
         description="expected torque noise of each joint [Nm or N], which weights its equations; null: equal weights",
     )
 
-    def to_options(self) -> ExcitationOptions:
+    def to_options(self) -> excitation.ExcitationOptions:
         """The options as the design takes them. Raises ExcitationError if a box is none."""
-        boxes = tuple(Box(np.array(box.low), np.array(box.high)) for box in self.boxes)
-        return ExcitationOptions(
-            period_s=self.duration_s,
-            harmonics=self.harmonics,
-            periods=self.periods,
-            criterion=Criterion(self.criterion),
-            scaling=ColumnScaling(self.scaling),
-            limit_fraction=self.limit_fraction,
-            torque_margin=self.torque_margin,
-            workspace=Workspace(self.floor_m, boxes, np.array(self.tool_m)),
-            slow_postures=self.slow_postures,
-            closing_period=self.closing_period,
-            starts=self.starts,
-            seed=self.seed,
-            noise_std=None if self.noise_std is None else np.array(self.noise_std),
-        )
+        boxes = tuple(excitation.Box(np.array(box.low), np.array(box.high)) for box in self.boxes)
+        same = {each.name for each in fields(excitation.ExcitationOptions)} & set(type(self).model_fields)
+        values = {name: getattr(self, name) for name in same} | {
+            "period_s": self.duration_s,
+            "criterion": excitation.Criterion(self.criterion),
+            "scaling": excitation.ColumnScaling(self.scaling),
+            "workspace": excitation.Workspace(self.floor_m, boxes, np.array(self.tool_m)),
+            "noise_std": None if self.noise_std is None else np.array(self.noise_std),
+        }
+        return excitation.ExcitationOptions(**values)
 
 
 class Request(StrictModel):
@@ -109,7 +93,7 @@ class Result:
 
     request: Request
     robot: Robot
-    design: ExcitationDesign
+    design: excitation.ExcitationDesign
 
     @property
     def outputs(self) -> Outputs:
@@ -118,25 +102,22 @@ class Result:
             {
                 "trajectory.json": lambda: trajectory_json(self.design.trajectory),
                 "trajectory.csv": lambda: trajectory_csv(self.design.trajectory, self.request.rate_hz),
-                "result.json": lambda: json_text(excitation_document(self.design)),
+                "result.json": lambda: json_text(excitation.excitation_document(self.design)),
             }
         )
 
 
 def perform(request: Request, files: Files, progress: Progress) -> Result:
-    """Read the robot and design its motion.
-
-    Raises TauscopeError where the robot file is not valid, or no motion keeps the limits.
-    """
+    """Read the robot and design its motion. Raises TauscopeError where no motion keeps the limits."""
     progress("read robot")
     robot = read_robot(files.find("robot", request.robot))
     progress("design the motion")
 
-    def tell(now: OptimiserProgress) -> None:
+    def tell(now: excitation.OptimiserProgress) -> None:
         figures = {"step": now.step, "cost": _finite(now.cost), "best_cost": _finite(now.best)}
         progress(f"{now.step}, best {now.best:.4g}", round(100.0 * now.fraction, 1), figures)
 
-    return Result(request, robot, design_excitation(robot, request.options.to_options(), progress=tell))
+    return Result(request, robot, excitation.design_excitation(robot, request.options.to_options(), progress=tell))
 
 
 def _finite(value: float) -> float | None:

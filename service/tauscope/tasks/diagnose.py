@@ -27,24 +27,14 @@ from tauscope.export.simulation_files import improved_robot, scenario_text
 from tauscope.identification import Options
 from tauscope.recording import Recording
 from tauscope.robot import read_robot
+from tauscope.tasks import task
 from tauscope.tasks.identify import CutoffFrequency
-from tauscope.tasks.task import (
-    Files,
-    Outputs,
-    Progress,
-    ReadingOptions,
-    TaskRequest,
-    TaskResult,
-    command_words,
-    json_text,
-    read_recordings,
-)
 from tauscope.trajectory import trajectory_json
 from tauscope.trajectory.csv_format import trajectory_csv
 from tauscope.trajectory.files import DEFAULT_RATE_HZ
 
 
-class DiagnosisOptions(ReadingOptions):
+class DiagnosisOptions(task.ReadingOptions):
     """How a diagnosis is done."""
 
     against: Literal["identified", "model", "simulation", "saved"] = Field(
@@ -65,10 +55,9 @@ class DiagnosisOptions(ReadingOptions):
     )
 
 
-class Request(TaskRequest):
+class Request(task.TaskRequest):
     """What is to be diagnosed, by the names of its files."""
 
-    robot: str = Field(description="robot file")
     recordings: tuple[str, ...] = Field(description="recordings that are to be explained")
     held_out: tuple[str, ...] = Field(default=(), description="recordings that confirm findings")
     simulated: tuple[str, ...] = Field(default=(), description="recordings made in the user's own simulator")
@@ -79,7 +68,7 @@ class Request(TaskRequest):
     def command(self) -> tuple[str, ...]:
         """The command line that does the same."""
         compared = (*self.simulated, *self.inputs["model"])
-        return command_words(
+        return task.command_words(
             "diagnose",
             self.robot,
             recordings=self.recordings,
@@ -92,7 +81,7 @@ class Request(TaskRequest):
 
 
 @dataclass(frozen=True, eq=False)
-class Result(TaskResult):
+class Result(task.TaskResult):
     """What came of it."""
 
     held_out: tuple[Recording, ...]
@@ -102,22 +91,22 @@ class Result(TaskResult):
     refusal: ExcitationError | None  # why the next motion cannot be planned within the robot's limits
 
     @property
-    def outputs(self) -> Outputs:
+    def outputs(self) -> task.Outputs:
         """documents, improved robot and scenario, exports, and the motion where one was planned."""
         made = {
-            "plots.json": lambda: json_text(diagnosis_plots(self.diagnosis), None),
+            "plots.json": lambda: task.json_text(diagnosis_plots(self.diagnosis), None),
             "model.json": self._model,
             "scenario.yaml": lambda: scenario_text(self.diagnosis),
             "improved-robot.yaml": self._improved_robot,
             "report.html": self._report,
-            "result.json": lambda: json_text(self.document),
+            "result.json": lambda: task.json_text(self.document),
             **{file.output: partial(self._export, kind) for kind, file in {**EXPORT_FILES, **CODE_FILES}.items()},
         }
         if self.planned is not None:
             trajectory = self.planned.trajectory
             made["trajectory.json"] = lambda: trajectory_json(trajectory)
             made["trajectory.csv"] = lambda: trajectory_csv(trajectory, DEFAULT_RATE_HZ)
-        return Outputs(made)
+        return task.Outputs(made)
 
     def _improved_robot(self) -> str:
         source = self.files.find("robot", self.request.robot)
@@ -130,7 +119,7 @@ class Result(TaskResult):
     def _model(self) -> str:
         found = self.diagnosis
         plain = identified_document(found.identification) if found.findings else None
-        return json_text(model_file(model_document(found), found.robot, self.origin, plain))
+        return task.json_text(model_file(model_document(found), found.robot, self.origin, plain))
 
     def _report(self) -> str:
         from tauscope.report.diagnosis_report import diagnosis_report
@@ -138,7 +127,7 @@ class Result(TaskResult):
         return diagnosis_report(self.diagnosis, self.document, self.provenance, self.planned)
 
 
-def perform(request: Request, files: Files, progress: Progress) -> Result:
+def perform(request: Request, files: task.Files, progress: task.Progress) -> Result:
     """Read the files and diagnose the arm. Raises TauscopeError where the data or the robot cannot answer."""
     if request.options.against == "saved" and request.model is None:
         raise IdentificationError("against saved: no model was given; give one, or compare with something else")
@@ -149,10 +138,10 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     progress("read robot and recordings")
     robot = read_robot(files.find("robot", request.robot))
     saved = None if request.model is None else read_extended_model(files.find("model", request.model), robot)
-    recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)
-    held_out = read_recordings(files, "held_out", request.held_out, robot, request.options)
+    recordings = task.read_recordings(files, "recordings", request.recordings, robot, request.options)
+    held_out = task.read_recordings(files, "held_out", request.held_out, robot, request.options)
     robot, recordings, held_out = make_efforts(robot, recordings, held_out)
-    simulated = read_recordings(files, "simulated", request.simulated, robot, request.options)
+    simulated = task.read_recordings(files, "simulated", request.simulated, robot, request.options)
     options = Options(cutoff_hz=request.options.cutoff_hz)
     found = diagnose(robot, recordings, held_out, options, progress)
     if simulated:

@@ -10,32 +10,15 @@ from tauscope.actuation import make_efforts
 from tauscope.export.formats import EXPORT_FILES, ExportFormat, make_export
 from tauscope.export.model import of_identification
 from tauscope.export.model_file import identified_document, model_file
-from tauscope.identification import (
-    Estimator,
-    Identification,
-    IdentificationDocument,
-    Options,
-    document,
-    identify,
-)
+from tauscope.identification import Estimator, Identification, IdentificationDocument, Options, document, identify
 from tauscope.recording import Recording
 from tauscope.robot import read_robot
-from tauscope.tasks.task import (
-    Files,
-    Outputs,
-    Progress,
-    ReadingOptions,
-    TaskRequest,
-    TaskResult,
-    command_words,
-    json_text,
-    read_recordings,
-)
+from tauscope.tasks import task
 
 CutoffFrequency = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 
-class IdentificationOptions(ReadingOptions):
+class IdentificationOptions(task.ReadingOptions):
     """How an identification is done."""
 
     estimator: Literal["ls", "wls"] = Field(default="wls", description="how the joints' equations are weighted")
@@ -50,33 +33,16 @@ class IdentificationOptions(ReadingOptions):
     )
 
 
-class Request(TaskRequest):
+class Request(task.TaskRequest):
     """What is to be identified, by the names of its files."""
 
-    robot: str = Field(description="robot file")
     recordings: tuple[str, ...] = Field(description="recordings that the model is made from")
     held_out: tuple[str, ...] = Field(default=(), description="recordings that it is judged by")
     options: IdentificationOptions = Field(default=IdentificationOptions(), description="how it is identified")
 
-    @property
-    def command(self) -> tuple[str, ...]:
-        """The command line that does the same."""
-        options = self.options
-        return command_words(
-            "identify",
-            self.robot,
-            recordings=self.recordings,
-            held_out=self.held_out,
-            estimator=options.estimator,
-            cutoff=options.cutoff_hz,
-            rotor_inertia=options.rotor_inertia,
-            prior=options.prior,
-            **options.words,
-        )
-
 
 @dataclass(frozen=True, eq=False)
-class Result(TaskResult):
+class Result(task.TaskResult):
     """What came of it."""
 
     held_out: tuple[Recording, ...]
@@ -84,16 +50,16 @@ class Result(TaskResult):
     document: IdentificationDocument
 
     @property
-    def outputs(self) -> Outputs:
+    def outputs(self) -> task.Outputs:
         """``result.json``, ``model.json``, ``plots.json``, ``report.html``, and ``exports/…`` as in `EXPORT_FILES`."""
         exports = {file.output: partial(self._export, kind) for kind, file in EXPORT_FILES.items()}
         documents = {"plots.json": self._plots, "report.html": self._report, "model.json": self._model}
-        return Outputs({**documents, "result.json": partial(json_text, self.document), **exports})
+        return task.Outputs({**documents, "result.json": partial(task.json_text, self.document), **exports})
 
     def _plots(self) -> str:
         from tauscope.report.curves import identification_plots
 
-        return json_text(identification_plots(self.identification, self.recordings, self.held_out), None)
+        return task.json_text(identification_plots(self.identification, self.recordings, self.held_out), None)
 
     def _report(self) -> str:
         from tauscope.report.identification_report import identification_report
@@ -104,15 +70,15 @@ class Result(TaskResult):
         return make_export(export_format, of_identification(self.identification, self.origin))
 
     def _model(self) -> str:
-        return json_text(model_file(identified_document(self.identification), self.robot, self.origin))
+        return task.json_text(model_file(identified_document(self.identification), self.robot, self.origin))
 
 
-def perform(request: Request, files: Files, progress: Progress) -> Result:
+def perform(request: Request, files: task.Files, progress: task.Progress) -> Result:
     """Read the files and identify the arm. Raises TauscopeError where the data or the robot cannot answer."""
     progress("read robot and recordings")
     robot = read_robot(files.find("robot", request.robot))
-    recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)
-    held_out = read_recordings(files, "held_out", request.held_out, robot, request.options)
+    recordings = task.read_recordings(files, "recordings", request.recordings, robot, request.options)
+    held_out = task.read_recordings(files, "held_out", request.held_out, robot, request.options)
     robot, recordings, held_out = make_efforts(robot, recordings, held_out)
     asked = request.options
     options = Options(Estimator(asked.estimator), asked.cutoff_hz, asked.rotor_inertia, asked.prior)

@@ -8,48 +8,29 @@ from pydantic import Field
 from tauscope.closed_loop import Rollout, RolloutDocument, roll_out
 from tauscope.export.model_file import read_export_models
 from tauscope.robot import read_robot
-from tauscope.tasks.task import (
-    Files,
-    Outputs,
-    Progress,
-    ReadingOptions,
-    TaskRequest,
-    TaskResult,
-    command_words,
-    json_text,
-    read_recordings,
-)
+from tauscope.tasks import task
 
 
-class Request(TaskRequest):
+class Request(task.TaskRequest):
     """What is to be rolled out, by the names of its files."""
 
-    robot: str = Field(description="robot file")
     recordings: tuple[str, ...] = Field(description="recordings with commands, or with torque")
     refine: tuple[str, ...] = Field(default=(), description="recordings by which the model is refined")
     model: str | None = Field(default=None, description="model that identify or diagnose saved")
-    options: ReadingOptions = Field(default=ReadingOptions(), description="how the recordings are read")
-
-    @property
-    def command(self) -> tuple[str, ...]:
-        """The command line that does the same."""
-        words = {} if self.model is None else {"model": self.model}
-        return command_words(
-            "rollout", self.robot, recordings=self.recordings, refine=self.refine, **words, **self.options.words
-        )
+    options: task.ReadingOptions = Field(default=task.ReadingOptions(), description="how the recordings are read")
 
 
 @dataclass(frozen=True, eq=False)
-class Result(TaskResult):
+class Result(task.TaskResult):
     """What came of it."""
 
     rollout: Rollout
     document: RolloutDocument
 
     @property
-    def outputs(self) -> Outputs:
+    def outputs(self) -> task.Outputs:
         """``result.json`` and ``report.html``."""
-        return Outputs({"result.json": partial(json_text, self.document), "report.html": self._report})
+        return task.Outputs({"result.json": partial(task.json_text, self.document), "report.html": self._report})
 
     def _report(self) -> str:
         from tauscope.closed_loop.page import rollout_page
@@ -57,12 +38,12 @@ class Result(TaskResult):
         return rollout_page(self.rollout, self.provenance)
 
 
-def perform(request: Request, files: Files, progress: Progress) -> Result:
+def perform(request: Request, files: task.Files, progress: task.Progress) -> Result:
     """Read the files and simulate. Raises TauscopeError where the data, the robot or the model cannot answer."""
     progress("read robot and recordings")
     robot = read_robot(files.find("robot", request.robot))
     exports = () if request.model is None else read_export_models(files.find("model", request.model))
-    recordings = read_recordings(files, "recordings", request.recordings, robot, request.options)
-    training = read_recordings(files, "refine", request.refine, robot, request.options)
+    recordings = task.read_recordings(files, "recordings", request.recordings, robot, request.options)
+    training = task.read_recordings(files, "refine", request.refine, robot, request.options)
     found = roll_out(robot, recordings, exports, progress, training)
     return Result(request, files, found.robot, recordings, found, found.document)

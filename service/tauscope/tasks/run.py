@@ -29,10 +29,8 @@ class BackendChoice(StrictModel):
         default="virtual", description="of the simulated arm: as fast as it computes, or by the clock"
     )
     scenario: dict[str, Any] | None = Field(
-        default=None,
-        description="what the simulated arm conceals: content of a scenario file; null: nothing",
+        default=None, description="what the simulated arm conceals: content of a scenario file; null: nothing"
     )
-
     keep_settings: bool = Field(
         default=False, description="whether servos keep in EEPROM what a run changed; false: it is put back"
     )
@@ -110,10 +108,7 @@ def start(
     sim_socket: Path | None = None,
     beats_by_itself: bool = True,
 ) -> RunProcess:
-    """Start the control process of a run.
-
-    Raises RobotFileError if the robot file is not valid. Raises AcquisitionError if the process cannot be started.
-    """
+    """Start the control process. Raises RobotFileError for the robot file, AcquisitionError for the process."""
     robot_file, backend = files.find("robot", request.robot), request.backend
     settings: dict[str, Any] = {
         "time": backend.time,

@@ -1,7 +1,7 @@
 """What all tasks share: how a request names files, how progress is told, and how outputs are made."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from tauscope.errors import RecordingMismatchError
-from tauscope.export.compensation import RecordingSource
+from tauscope.export.compensation.model import RecordingSource
 from tauscope.export.model import Origin
 from tauscope.recording import EffortKind, Reading, Recording, flow_text, open_recording
 from tauscope.remote_files import find_path
@@ -19,6 +19,7 @@ from tauscope.report.provenance import InputFile, Provenance, input_files, versi
 from tauscope.robot import RecordingLayout, Robot, find_column_fault, find_fault, find_separator_fault
 from tauscope.strict_model import StrictModel
 
+# Name of each input of a request in a report.
 ROLES = {
     "recordings": "recording",
     "held_out": "held out",
@@ -26,16 +27,23 @@ ROLES = {
     "simulated": "compared with",
     "model": "compared with",
 }
-"""Name of each input of a request in a report."""
 
 
 class TaskRequest(StrictModel):
     """A request that names recordings, and perhaps a model."""
 
+    robot: str = Field(description="robot file")
+    options: Any
+
     @property
     def command(self) -> tuple[str, ...]:
-        """The command line that does the same."""
-        raise NotImplementedError
+        """The command line that does the same: the verb is the name of its module."""
+        verb = type(self).__module__.rpartition(".")[2]
+        own = {name: value for name, value in self if name not in ("robot", "options") and value is not None}
+        asked = {
+            name.removesuffix("_hz"): value for name, value in self.options if name not in ReadingOptions.model_fields
+        }
+        return command_words(verb, self.robot, **own, **asked, **self.options.words)
 
     @property
     def inputs(self) -> dict[str, tuple[str, ...]]:
@@ -68,8 +76,7 @@ class ReadingOptions(StrictModel):
     )
     decimal: str | None = Field(default=None, description="decimal sign of a CSV; null: detected")
     delimiter: str | None = Field(
-        default=None,
-        description="delimiter of a CSV: comma, semicolon, tab, blank or |; null: detected",
+        default=None, description="delimiter of a CSV: comma, semicolon, tab, blank or |; null: detected"
     )
     topic: str | None = Field(default=None, description="topic of a log that has several with joint states")
 
@@ -102,15 +109,8 @@ class ReadingOptions(StrictModel):
     @property
     def reading(self) -> Reading:
         """The same for those who read."""
-        return Reading(
-            self.units or {},
-            self.rate_hz,
-            self.trust_units,
-            columns=self.columns,
-            decimal=self.decimal,
-            delimiter=self.delimiter,
-            topic=self.topic,
-        )
+        layout = {each.name: getattr(self, each.name) for each in fields(RecordingLayout)}
+        return Reading(**{**layout, "units": self.units or {}}, trust_units=self.trust_units)
 
     @property
     def words(self) -> dict[str, Any]:
@@ -119,9 +119,7 @@ class ReadingOptions(StrictModel):
             "units": ",".join(f"{column}={unit}" for column, unit in (self.units or {}).items()) or None,
             "rate": self.rate_hz,
             "trust_units": self.trust_units or None,
-            "columns": self.columns
-            if self.columns is None or isinstance(self.columns, str)
-            else flow_text(self.columns),
+            "columns": flow_text(self.columns) if isinstance(self.columns, dict) else self.columns,
             "decimal": self.decimal,
             "delimiter": self.delimiter,
             "topic": self.topic,
@@ -157,10 +155,7 @@ class Files:
 
 
 class Outputs(Mapping[str, bytes]):
-    """Files that a task can write, by name; each is made when it is asked for.
-
-    Asking raises ExportError where a format cannot hold the model.
-    """
+    """Files that a task can write, by name, each made when asked for; ExportError where a format is too poor."""
 
     def __init__(self, make: Mapping[str, Callable[[], str | bytes]]) -> None:
         self._make = make
@@ -250,10 +245,7 @@ class TaskResult:
 
 
 def command_words(verb: str, robot: str, **options: Any) -> tuple[str, ...]:
-    """The command line that does the same, with every option spelled out; outputs are left to whoever repeats it.
-
-    `**options`: by the name of the option; `recordings` has none, an empty tuple is left out.
-    """
+    """The command line that does the same, each of `options` spelled out but outputs; empty tuples are left out."""
     words = ["tauscope", verb, robot]
     for name, value in options.items():
         option = f"--{name.replace('_', '-')}"

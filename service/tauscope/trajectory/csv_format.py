@@ -14,39 +14,26 @@ from tauscope.trajectory.fourier_series import MotionSamples
 from tauscope.trajectory.segments import SampledSegment
 from tauscope.trajectory.trajectory import Trajectory
 
-GROUPS = ("q", "qd", "qdd")
-"""Prefixes of the columns that hold position, velocity and acceleration."""
+GROUPS = ("q", "qd", "qdd")  # prefixes of the columns that hold position, velocity and acceleration
 
+# Positions alone become a quintic spline that rests at both ends: four times continuously differentiable.
 SPLINE_DEGREE = 5
-"""Positions alone become a quintic spline that rests at both ends: four times continuously differentiable."""
-
-SPEED_MISFIT = 0.05
-"""Part of the largest speed by which the velocities may miss the slope of the positions."""
-
-POSITION_ROUNDING = 1e-4
-"""Rounding of the positions that is not held against the velocities [rad or m]."""
-
+SPEED_MISFIT = 0.05  # part of the largest speed by which the velocities may miss the slope of the positions
+POSITION_ROUNDING = 1e-4  # rounding of the positions that is not held against the velocities [rad or m]
 _COLUMN = re.compile(r"^(qdd|qd|q)([1-9][0-9]{0,2})$")
 
 
-PIECE_ROWS = 10_000
-"""Rows of a piece of text: some megabytes, made in a fraction of a second."""
+PIECE_ROWS = 10_000  # rows of a piece of text: some megabytes, made in a fraction of a second
 
 
 def trajectory_csv(trajectory: Trajectory, rate_hz: float) -> str:
-    """A trajectory as CSV text: t, q1…, qd1…, qdd1…, period; shortest digits that read back as they were.
-
-    `rate_hz`: samples a second [Hz].
-    """
+    """CSV text: t, q1…, qd1…, qdd1…, period; shortest digits that read back as they were."""
     starts = range(0, trajectory.count_samples(rate_hz), PIECE_ROWS)
     return "".join(write_trajectory_rows(trajectory, rate_hz, start) for start in starts)
 
 
 def write_trajectory_rows(trajectory: Trajectory, rate_hz: float, start: int) -> str:
-    """`PIECE_ROWS` rows of the text from row `start` on; the header goes before the first ones.
-
-    `rate_hz`: samples a second [Hz].
-    """
+    """`PIECE_ROWS` rows of the text from row `start` on; the header goes before the first ones."""
     stop = min(start + PIECE_ROWS, trajectory.count_samples(rate_hz))
     samples = trajectory.evaluate(np.arange(start, stop) / rate_hz)
     joints = range(1, trajectory.joint_count + 1)

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from tauscope.errors import ExcitationError
 from tauscope.robot.robot import Array
+from tauscope.strict_model import take_fields
 from tauscope.trajectory.fourier_series import FourierSeries, MotionSamples
 from tauscope.trajectory.limits import MotionLimits
 from tauscope.trajectory.segments import FourierSegment, MoveSegment, PathSegment, SampledSegment, Segment
@@ -88,18 +89,6 @@ class LimitsEntry(TrajectoryPart):
     assumed: list[str] = Field(default_factory=list, description="limits that the robot file does not state")
 
 
-class DesignEntry(TrajectoryPart):
-    """How the trajectory was made."""
-
-    criterion: str = Field(description="what was minimised")
-    value: float = Field(description="its value")
-    condition_number: float = Field(description="of the stacked, unweighted regressor of the repeated part")
-    margins: dict[str, list[float | None]] = Field(
-        description="part of each kind of limit that is left, one a joint; null where there is no limit"
-    )
-    seed: int = Field(description="of the optimiser's starts")
-
-
 class TrajectoryDocument(TrajectoryPart):
     """A trajectory file."""
 
@@ -109,59 +98,30 @@ class TrajectoryDocument(TrajectoryPart):
     robot: str = Field(description="name of the robot that it was made for")
     joints: list[str] = Field(min_length=1, description="names of the joints, base first")
     limits: LimitsEntry | None = Field(default=None, description="null where nobody knows")
-    design: DesignEntry | None = Field(default=None, description="null for a motion from elsewhere")
+    design: DesignRecord | None = Field(default=None, description="null for a motion from elsewhere")
     segments: list[SegmentEntry] = Field(min_length=1, description="the pieces in order, each at rest at both ends")
 
 
 def trajectory_document(trajectory: Trajectory) -> TrajectoryDocument:
     """The document of a trajectory."""
-    limits, design = trajectory.limits, trajectory.design
-    return TrajectoryDocument(
-        robot=trajectory.robot,
-        joints=list(trajectory.joints),
-        limits=None if limits is None else _limits_entry(limits),
-        design=None
-        if design is None
-        else DesignEntry(
-            criterion=design.criterion,
-            value=design.value,
-            condition_number=design.condition_number,
-            margins={kind: list(values) for kind, values in design.margins.items()},
-            seed=design.seed,
-        ),
-        segments=[_segment_entry(segment) for segment in trajectory.segments],
-    )
+    limits, entry = trajectory.limits, None
+    if limits is not None:
+        torque = [float(value) if np.isfinite(value) else None for value in limits.torque]
+        entry = take_fields(LimitsEntry, limits, torque=torque)
+    segments = [_segment_entry(segment) for segment in trajectory.segments]
+    return take_fields(TrajectoryDocument, trajectory, limits=entry, segments=segments)
 
 
 def trajectory_of(document: TrajectoryDocument) -> Trajectory:
     """The trajectory that a document describes. Raises ExcitationError naming the key."""
     joints = len(document.joints)
     segments = tuple(_segment_of(entry, joints, f"segments[{place}]") for place, entry in enumerate(document.segments))
-    design = document.design
-    return Trajectory(
-        robot=document.robot,
-        joints=tuple(document.joints),
-        segments=segments,
-        limits=None if document.limits is None else _limits_of(document.limits, joints),
-        design=None
-        if design is None
-        else DesignRecord(
-            design.criterion,
-            design.value,
-            design.condition_number,
-            {kind: tuple(values) for kind, values in design.margins.items()},
-            design.seed,
-        ),
-    )
+    limits = None if document.limits is None else _limits_of(document.limits, joints)
+    return Trajectory(document.robot, tuple(document.joints), segments, limits, document.design)
 
 
 def _series_entry(series: FourierSeries) -> SeriesEntry:
-    return SeriesEntry(
-        period_s=float(series.period_s),
-        centre=series.centre.tolist(),
-        cosine=series.cosine.tolist(),
-        sine=series.sine.tolist(),
-    )
+    return take_fields(SeriesEntry, series, period_s=float(series.period_s))
 
 
 def _segment_entry(segment: Segment) -> FourierEntry | PathEntry | MoveEntry | SampledEntry:
@@ -170,18 +130,13 @@ def _segment_entry(segment: Segment) -> FourierEntry | PathEntry | MoveEntry | S
         return FourierEntry(repeats=segment.repeats, first_period=segment.first_period, **series)
     if isinstance(segment, PathSegment):
         series = _series_entry(segment.series)
-        return PathEntry(series=series, from_s=segment.from_s, to_s=segment.to_s, duration_s=segment.duration_s)
+        return take_fields(PathEntry, segment, series=series)
     if isinstance(segment, MoveSegment):
-        return MoveEntry(start=segment.start.tolist(), end=segment.end.tolist(), duration_s=segment.duration_s)
+        return take_fields(MoveEntry, segment)
     if isinstance(segment, SampledSegment):
         label = segment.label
-        return SampledEntry(
-            time=segment.time.tolist(),
-            position=segment.motion.position.tolist(),
-            velocity=segment.motion.velocity.tolist(),
-            acceleration=segment.motion.acceleration.tolist(),
-            period=None if label is None else [None if np.isnan(value) else float(value) for value in label],
-        )
+        period = None if label is None else [None if np.isnan(value) else float(value) for value in label]
+        return take_fields(SampledEntry, segment.motion, time=segment.time.tolist(), period=period)
     raise ExcitationError(f"a segment of kind {type(segment).__name__} has no place in a trajectory file")
 
 
@@ -218,17 +173,6 @@ def _series_of(entry: SeriesEntry, joints: int, key: str) -> FourierSeries:
         raise ExcitationError(f"{key}.cosine: holds no coefficients; give one row a joint, one number a harmonic")
     cosine, sine = (_array(getattr(entry, n), (joints, harmonics), f"{key}.{n}") for n in ("cosine", "sine"))
     return FourierSeries(entry.period_s, centre, cosine, sine)
-
-
-def _limits_entry(limits: MotionLimits) -> LimitsEntry:
-    return LimitsEntry(
-        position_low=limits.position_low.tolist(),
-        position_high=limits.position_high.tolist(),
-        velocity=limits.velocity.tolist(),
-        acceleration=limits.acceleration.tolist(),
-        torque=[float(value) if np.isfinite(value) else None for value in limits.torque],
-        assumed=list(limits.assumed),
-    )
 
 
 def _limits_of(entry: LimitsEntry, joints: int) -> MotionLimits:

@@ -5,32 +5,20 @@ from typing import Any
 
 from pydantic import BaseModel, Field, ValidationError
 
-from tauscope.errors import ExcitationError, RobotFileError
+from tauscope.errors import ExcitationError, RobotFileError, explain_os_errors
 from tauscope.robot import Robot
 from tauscope.robot.bounded_file import decode_utf8, read_bounded
 from tauscope.robot.messages import shown
+from tauscope.trajectory import document as documents
 from tauscope.trajectory.csv_format import parse_trajectory_csv, trajectory_csv
-from tauscope.trajectory.document import (
-    EXCITATION_SCHEMA,
-    ExcitationDocument,
-    TrajectoryDocument,
-    trajectory_document,
-    trajectory_of,
-)
 from tauscope.trajectory.trajectory import Trajectory
 
-LARGEST_FILE = 256 * 2**20
-"""Bytes of the largest trajectory file that is read."""
-
-DEFAULT_RATE_HZ = 500.0
-"""Rate of CSV samples where none is asked for [Hz]."""
+LARGEST_FILE = 256 * 2**20  # bytes of the largest trajectory file that is read
+DEFAULT_RATE_HZ = 500.0  # rate of CSV samples where none is asked for [Hz]
 
 
 def read_trajectory(path: str | Path, robot: Robot) -> Trajectory:
-    """Read a trajectory for a robot: JSON (``.json``) or CSV (anything else).
-
-    Raises ExcitationError naming the file and the key, or the line and the column.
-    """
+    """Read JSON (``.json``) or else CSV. Raises ExcitationError, which names file and key, or line and column."""
     path = Path(path)
     try:
         text = decode_utf8(read_bounded(path, LARGEST_FILE), str(path))
@@ -54,39 +42,32 @@ def parse_trajectory_json(text: str | bytes, name: str, robot: Robot) -> Traject
             f"{robot.joint_count}; take one that was made for it"
         )
     try:
-        return trajectory_of(document)
+        return documents.trajectory_of(document)
     except ExcitationError as error:
         raise ExcitationError(f"{name}: {error}") from None
 
 
 def trajectory_json(trajectory: Trajectory) -> str:
     """A trajectory as a JSON document, schema ``tauscope.trajectory/1``."""
-    return trajectory_document(trajectory).model_dump_json(by_alias=True, indent=1) + "\n"
+    return documents.trajectory_document(trajectory).model_dump_json(by_alias=True, indent=1) + "\n"
 
 
 def write_trajectory(trajectory: Trajectory, path: str | Path, *, rate_hz: float = DEFAULT_RATE_HZ) -> None:
-    """Write a trajectory: JSON (``.json``) or CSV (``.csv``).
-
-    Raises ExcitationError for another suffix, or where the file cannot be written.
-
-    `rate_hz`: samples a second of a CSV file [Hz].
-    """
+    """Write JSON or CSV. Raises ExcitationError for another suffix, or where it cannot be written."""
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in (".json", ".csv"):
         raise ExcitationError(f"{path}: a trajectory file ends in .json or .csv; rename it")
     text = trajectory_json(trajectory) if suffix == ".json" else trajectory_csv(trajectory, rate_hz)
-    try:
+    with explain_os_errors(ExcitationError, f"{path}: cannot be written", "; choose another place"):
         path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ExcitationError(f"{path}: cannot be written ({error.strerror or error}); choose another place") from error
 
 
-def _document(text: str | bytes) -> TrajectoryDocument:
+def _document(text: str | bytes) -> documents.TrajectoryDocument:
     """The trajectory's document, by itself or within an excitation's."""
-    if _Schema.model_validate_json(text).schema_ == EXCITATION_SCHEMA:
-        return ExcitationDocument.model_validate_json(text).trajectory
-    return TrajectoryDocument.model_validate_json(text)
+    if _Schema.model_validate_json(text).schema_ == documents.EXCITATION_SCHEMA:
+        return documents.ExcitationDocument.model_validate_json(text).trajectory
+    return documents.TrajectoryDocument.model_validate_json(text)
 
 
 class _Schema(BaseModel):

@@ -7,16 +7,12 @@ import numpy as np
 from tauscope.errors import ExcitationError
 from tauscope.robot.robot import Array
 
-LEAST_HARMONICS = 2
-"""One harmonic alone cannot be at rest, with zero acceleration, at the ends of its period."""
+LEAST_HARMONICS = 2  # one harmonic alone cannot be at rest, with zero acceleration, at the ends of its period
 
 
 @dataclass(frozen=True, eq=False)
 class MotionSamples:
-    """A motion at given instants.
-
-    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈ [rad or m, and per s, per s²].
-    """
+    """q, q̇, q̈ at given instants, (N, n) each [rad or m, and per s, per s²]."""
 
     position: Array
     velocity: Array
@@ -25,10 +21,7 @@ class MotionSamples:
 
 @dataclass(frozen=True, eq=False)
 class FourierSeries:
-    """One finite Fourier series a joint about a centre, M harmonics of ω_f = 2π/T, the seed paper's section 5.2.
-
-    q̇_i(t) = Σ_l a_l cos(ω_f l t) + b_l sin(ω_f l t)
-    """
+    """q̇_i(t) = Σ_l a_l cos(ω_f l t) + b_l sin(ω_f l t), M harmonics of ω_f = 2π/T: the seed paper's section 5.2."""
 
     period_s: float  # fundamental period T [s]
     centre: Array  # (n,), mean position [rad or m]
@@ -74,11 +67,7 @@ class FourierSeries:
 
 
 def between_samples(harmonics: int, samples: int) -> float:
-    """Factor by which a trigonometric polynomial may exceed its largest equispaced sample: 1/cos(π M / K).
-
-    Ehlich and Zeller's bound for degree M and K > 2 M samples a period: what holds at the samples with this factor to
-    spare holds at every instant.
-    """
+    """Factor 1/cos(π M / K) by which degree M may exceed its largest of K > 2 M samples (Ehlich and Zeller)."""
     if samples <= 2 * harmonics:
         raise ExcitationError(f"{samples} samples a period cannot bound {harmonics} harmonics; take more samples")
     return float(1.0 / np.cos(np.pi * harmonics / samples))

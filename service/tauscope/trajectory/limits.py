@@ -8,14 +8,12 @@ from tauscope.robot import JointType, Robot
 from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
 
+# Positions from minus to plus this where no range is stated [rad or m].
 DEFAULT_RANGE = {JointType.REVOLUTE: np.pi, JointType.PRISMATIC: 0.25}
-"""Positions from minus to plus this where no range is stated [rad or m]."""
+DEFAULT_SPEED = {JointType.REVOLUTE: 1.0, JointType.PRISMATIC: 0.25}  # speed where no limit is stated [rad/s or m/s]
 
-DEFAULT_SPEED = {JointType.REVOLUTE: 1.0, JointType.PRISMATIC: 0.25}
-"""Speed where no limit is stated [rad/s or m/s]."""
-
+# Acceleration where no limit is stated [rad/s² or m/s²].
 DEFAULT_ACCELERATION = {JointType.REVOLUTE: 4.0, JointType.PRISMATIC: 1.0}
-"""Acceleration where no limit is stated [rad/s² or m/s²]."""
 
 
 @dataclass(frozen=True, eq=False)

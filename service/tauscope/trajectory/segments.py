@@ -4,8 +4,8 @@ Each begins and ends at rest with zero acceleration: any two that share a postur
 differentiable.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -13,53 +13,36 @@ from tauscope.errors import ExcitationError
 from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import FourierSeries, MotionSamples
 
-PEAK_SPEED = 1.875
-"""Largest speed of the minimum-jerk move over distance and duration one."""
-
-PEAK_ACCELERATION = 10.0 / np.sqrt(3.0)
-"""Largest acceleration of the minimum-jerk move over distance and duration one."""
+PEAK_SPEED = 1.875  # largest speed of the minimum-jerk move over distance and duration one
+PEAK_ACCELERATION = 10.0 / np.sqrt(3.0)  # largest acceleration of the minimum-jerk move over distance and duration one
 
 
-class Segment(Protocol):
+class Segment(ABC):
     """A piece of a trajectory."""
+
+    duration_s: float  # how long it lasts [s]
 
     @property
     def joint_count(self) -> int:
         """Number of joints n."""
-        ...
+        return self.evaluate(np.zeros(1)).position.shape[1]
 
-    @property
-    def duration_s(self) -> float:
-        """How long it lasts [s]."""
-        ...
-
+    @abstractmethod
     def evaluate(self, time: Array) -> MotionSamples:
         """Exact position, velocity and acceleration. `time`: (N,), instants since its start [s]."""
-        ...
 
     def period(self, time: Array) -> Array:
-        """Index of the repeated excitation period, NaN where the motion is no part of it, shape (N,).
-
-        `time`: (N,), instants since its start [s].
-        """
-        ...
+        """Index of the repeated excitation period, (N,), NaN outside; `time`: (N,) since its start [s]."""
+        return np.full(len(time), np.nan)
 
 
 @dataclass(frozen=True, eq=False)
-class FourierSegment:
-    """Whole periods of a Fourier series.
-
-    `first_period`: index of the first repeat in a recording's column `period`; None where it is not to be counted.
-    """
+class FourierSegment(Segment):
+    """Whole periods of a Fourier series; `first_period` counts in column `period`, None where not to be counted."""
 
     series: FourierSeries
     repeats: int = 1
     first_period: int | None = None
-
-    @property
-    def joint_count(self) -> int:
-        """Number of joints n."""
-        return self.series.joint_count
 
     @property
     def duration_s(self) -> float:
@@ -80,20 +63,12 @@ class FourierSegment:
 
 
 @dataclass(frozen=True, eq=False)
-class MoveSegment:
-    """A straight minimum-jerk move from posture to posture: q = q_0 + (q_1 - q_0)(10 s³ - 15 s⁴ + 6 s⁵), s = t/T.
-
-    `start`, `end`: (n,), postures [rad or m].
-    """
+class MoveSegment(Segment):
+    """A minimum-jerk move between postures (n,): q = q_0 + (q_1 - q_0)(10 s³ - 15 s⁴ + 6 s⁵), s = t/T."""
 
     start: Array
     end: Array
     duration_s: float  # T [s]
-
-    @property
-    def joint_count(self) -> int:
-        """Number of joints n."""
-        return len(self.start)
 
     def evaluate(self, time: Array) -> MotionSamples:
         """Exact position, velocity and acceleration. `time`: (N,), instants since its start [s]."""
@@ -104,35 +79,18 @@ class MoveSegment:
         position = np.where(from_end, self.end - (1.0 - progress)[:, None] * way, self.start + progress[:, None] * way)
         return MotionSamples(position, rate[:, None] * way, bend[:, None] * way)
 
-    def period(self, time: Array) -> Array:
-        """NaN: no part of the repeated excitation, shape (N,). `time`: (N,), instants since its start [s]."""
-        return np.full(len(time), np.nan)
-
 
 @dataclass(frozen=True, eq=False)
-class PathSegment:
-    """A move along the path of a Fourier series at a pace of its own: q = F(σ(t)), σ minimum-jerk.
-
-    It visits only postures that the series visits: where that keeps clear of obstacles, so does this.
-
-    `from_s`, `to_s`: instants of the series at which it begins and ends [s].
-    """
+class PathSegment(Segment):
+    """A move along a series' path at a pace of its own: q = F(σ(t)), σ minimum-jerk; it visits no other posture."""
 
     series: FourierSeries
-    from_s: float
-    to_s: float
+    from_s: float  # instant of the series at which it begins [s]
+    to_s: float  # instant of the series at which it ends [s]
     duration_s: float  # how long it takes [s]
 
-    @property
-    def joint_count(self) -> int:
-        """Number of joints n."""
-        return self.series.joint_count
-
     def evaluate(self, time: Array) -> MotionSamples:
-        """Exact position, velocity and acceleration: q̇ = F' σ̇, q̈ = F'' σ̇² + F' σ̈.
-
-        `time`: (N,), instants since its start [s].
-        """
+        """Exact q, q̇ = F' σ̇, q̈ = F'' σ̇² + F' σ̈; `time`: (N,) since its start [s]."""
         progress, rate, bend = minimum_jerk(time, self.duration_s)
         way = self.to_s - self.from_s
         sigma = np.where(progress > 0.5, self.to_s - (1.0 - progress) * way, self.from_s + progress * way)
@@ -140,17 +98,10 @@ class PathSegment:
         pace, change = (way * rate)[:, None], (way * bend)[:, None]
         return MotionSamples(path.position, path.velocity * pace, path.acceleration * pace**2 + path.velocity * change)
 
-    def period(self, time: Array) -> Array:
-        """NaN: no part of the repeated excitation, shape (N,). `time`: (N,), instants since its start [s]."""
-        return np.full(len(time), np.nan)
-
 
 @dataclass(frozen=True, eq=False)
-class SampledSegment:
-    """A motion given by samples, between them the quintic that meets position, velocity and acceleration at both.
-
-    `label`: (K,), index of the repeated excitation period from each sample on, NaN outside; None where there is none.
-    """
+class SampledSegment(Segment):
+    """Samples and the quintics between them; `label`: (K,), period from each sample on, NaN outside."""
 
     time: Array  # (K,), instants of the samples, from 0, increasing [s]
     motion: MotionSamples
@@ -162,20 +113,12 @@ class SampledSegment:
             raise ExcitationError("a sampled motion needs two or more instants that increase from 0")
 
     @property
-    def joint_count(self) -> int:
-        """Number of joints n."""
-        return self.motion.position.shape[1]
-
-    @property
     def duration_s(self) -> float:
         """How long it lasts [s]."""
         return float(self.time[-1])
 
     def evaluate(self, time: Array) -> MotionSamples:
-        """Position, velocity and acceleration of the interpolating quintics; the samples themselves at their instants.
-
-        `time`: (N,), instants since its start [s].
-        """
+        """Motion by the quintics, the samples themselves at their instants; `time`: (N,) since its start [s]."""
         left = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.time) - 2)
         width = (self.time[left + 1] - self.time[left])[:, None]
         share = (np.clip(time, 0.0, self.time[-1]) - self.time[left])[:, None] / width
@@ -196,11 +139,7 @@ class SampledSegment:
 
 
 def minimum_jerk(time: Array, duration_s: float) -> tuple[Array, Array, Array]:
-    """Progress 10 s³ - 15 s⁴ + 6 s⁵ of a move from 0 to 1 and its first two derivatives, s = t/T.
-
-    `time`: (N,), instants since its start [s]; `duration_s`: T [s]. Returns tuple of (N,), progress [1], its rate [1/s]
-    and the rate's rate [1/s²].
-    """
+    """Progress 10 s³ - 15 s⁴ + 6 s⁵ from 0 to 1, its rate and the rate's rate, (N,); s = `time`/T, (N,)."""
     s = np.clip(time / duration_s, 0.0, 1.0)
     progress = s**3 * (10.0 + s * (6.0 * s - 15.0))
     rate = 30.0 * (s * (1.0 - s)) ** 2 / duration_s

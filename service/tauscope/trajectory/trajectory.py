@@ -1,13 +1,14 @@
 """A trajectory: what a run plays and what trajectory files hold."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from pydantic import ConfigDict, Field
 
 from tauscope.errors import ExcitationError
 from tauscope.robot.robot import Array
+from tauscope.strict_model import StrictModel
 from tauscope.trajectory.fourier_series import MotionSamples
 from tauscope.trajectory.limits import MotionLimits
 from tauscope.trajectory.segments import (
@@ -19,32 +20,19 @@ from tauscope.trajectory.segments import (
     Segment,
 )
 
-JOIN_TOLERANCE = 1e-9
-"""Largest jump between segments that rounding explains [rad or m, and per s, per s²]."""
+JOIN_TOLERANCE = 1e-9  # largest jump between segments that rounding explains [rad or m, and per s, per s²]
 
+# Speed and acceleration at the ends of a motion given by samples that still count as rest [rad/s, rad/s²].
 SAMPLED_REST = 1e-3
-"""Speed and acceleration at the ends of a motion given by samples that still count as rest [rad/s, rad/s²]."""
-
-RAMP_FRACTION = 0.5
-"""Part of the velocity and acceleration limits that a ramp uses: nobody has seen this motion before."""
-
-SHORTEST_RAMP_S = 0.5
-"""A ramp lasts at least this long, also where there is no way to go [s]."""
-
-TIME_STEP_S = 0.01
-"""Durations of moves are a whole number of these [s]."""
-
-MOST_SAMPLES = 50_000_000
-"""Samples beyond which the asked rate must be a mistake."""
+RAMP_FRACTION = 0.5  # part of the velocity and acceleration limits that a ramp uses: nobody has seen this motion before
+SHORTEST_RAMP_S = 0.5  # a ramp lasts at least this long, also where there is no way to go [s]
+TIME_STEP_S = 0.01  # durations of moves are a whole number of these [s]
+MOST_SAMPLES = 50_000_000  # samples beyond which the asked rate must be a mistake
 
 
 @dataclass(frozen=True, eq=False)
 class TrajectorySamples:
-    """A trajectory at given instants.
-
-    `time`: (N,), instants since the start [s].
-    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈ [rad or m, and per s, per s²].
-    """
+    """A trajectory at instants `time`, (N,) [s]: q, q̇, q̈, (N, n) [rad or m, and per s, per s²]."""
 
     time: Array
     position: Array
@@ -53,19 +41,18 @@ class TrajectorySamples:
     period: Array  # (N,), index of the repeated excitation period, counted from 0; NaN outside the repeated part
 
 
-@dataclass(frozen=True)
-class DesignRecord:
-    """How a trajectory was made and what it is good for.
+class DesignRecord(StrictModel):
+    """How the trajectory was made."""
 
-    `margins`: for each kind of limit (``position``, ``velocity``, ``acceleration``, ``torque``) the part of the limit
-        that is left, one a joint; None where there is no limit.
-    """
+    model_config = ConfigDict(allow_inf_nan=False)
 
-    criterion: str
-    value: float
-    condition_number: float
-    margins: Mapping[str, tuple[float | None, ...]]
-    seed: int
+    criterion: str = Field(description="what was minimised")
+    value: float = Field(description="its value")
+    condition_number: float = Field(description="of the stacked, unweighted regressor of the repeated part")
+    margins: dict[str, list[float | None]] = Field(
+        description="part of each kind of limit that is left, one a joint; null where there is no limit"
+    )
+    seed: int = Field(description="of the optimiser's starts")
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,20 +106,11 @@ class Trajectory:
         return next(lengths, None)
 
     def samples(self, rate_hz: float) -> TrajectorySamples:
-        """The trajectory at a constant rate, from its start to its end.
-
-        Raises ExcitationError for a rate that is not positive, or absurd.
-
-        `rate_hz`: samples a second [Hz]. Returns TrajectorySamples: instants k / rate from 0 to the first one at which
-        the motion has ended.
-        """
+        """Samples at k / rate until the motion has ended. Raises ExcitationError for an absurd rate."""
         return self.evaluate(np.arange(self.count_samples(rate_hz)) / rate_hz)
 
     def count_samples(self, rate_hz: float) -> int:
-        """How many samples it has at a constant rate [1/s].
-
-        Raises ExcitationError for a rate that is not positive, or absurd.
-        """
+        """How many samples it has at a rate. Raises ExcitationError for one that is absurd."""
         if not (np.isfinite(rate_hz) and rate_hz > 0.0):
             raise ExcitationError(f"the sampling rate is {rate_hz} Hz; give a positive number")
         count = self.duration_s * rate_hz
@@ -143,10 +121,7 @@ class Trajectory:
         return int(np.ceil(count - 1e-6)) + 1
 
     def evaluate(self, time: Array) -> TrajectorySamples:
-        """The trajectory at given instants; before its start and after its end it stands still.
-
-        `time`: (N,), ascending instants since the start [s].
-        """
+        """The trajectory at `time`, (N,), ascending [s]; before its start and after its end it stands still."""
         shape = (len(time), self.joint_count)
         result = TrajectorySamples(time, np.empty(shape), np.empty(shape), np.empty(shape), np.full(len(time), np.nan))
         starts = np.concatenate([[0.0], np.cumsum([segment.duration_s for segment in self.segments])])
@@ -168,12 +143,9 @@ class Trajectory:
 
 
 def ramp(start: Array, end: Array, limits: MotionLimits, *, fraction: float = RAMP_FRACTION) -> MoveSegment:
-    """A straight minimum-jerk move between postures within the limits of velocity and acceleration.
+    """A straight minimum-jerk move from `start` to `end`, (n,), within the limits of velocity and acceleration.
 
-    Its duration is known before it runs, and it stays between the two postures: where both are within the position
-    limits, so is all of it. Raises ExcitationError for a posture that is not finite or has another number of joints.
-
-    `start`, `end`: (n,), postures [rad or m].
+    Between postures within the position limits all of it is. Raises ExcitationError for a posture that is none.
     """
     start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     joints = len(limits.velocity)
@@ -187,10 +159,7 @@ def ramp(start: Array, end: Array, limits: MotionLimits, *, fraction: float = RA
 
 
 def whole_steps(duration_s: float) -> float:
-    """A duration rounded up to `TIME_STEP_S`, so that what follows begins at a sample of all usual rates.
-
-    `duration_s`: shortest duration [s].
-    """
+    """A duration rounded up to `TIME_STEP_S`, so that what follows begins at a sample of all usual rates."""
     steps_a_second = round(1.0 / TIME_STEP_S)
     return float(np.ceil(duration_s * steps_a_second - 1e-9) / steps_a_second)
 

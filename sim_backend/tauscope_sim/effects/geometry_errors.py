@@ -8,7 +8,7 @@ from pydantic import Field
 from scipy.spatial.transform import Rotation
 
 from tauscope.robot.document_fields import Number, Vector
-from tauscope.robot.kinematics import rotation_about_x, rotation_about_y
+from tauscope.robot.kinematics import rotation_about
 from tauscope.robot.robot import Placement, Robot
 from tauscope_sim.effects.effect import Effect, JointNumber, zero_vector
 
@@ -26,7 +26,7 @@ class BaseTilt(Effect):
             raise self.refused("about_x", "and about_y are zero; state one of them [rad]")
 
     def alter(self, robot: Robot) -> Robot:
-        turned = rotation_about_x(self.about_x) @ rotation_about_y(self.about_y) @ robot.gravity
+        turned = rotation_about(0, self.about_x) @ rotation_about(1, self.about_y) @ robot.gravity
         return replace(robot, gravity=turned)
 
 

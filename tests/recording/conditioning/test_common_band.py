@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from tauscope.recording.conditioning import AllPass, Decimator, HarmonicBand
-from tauscope.recording.conditioning.common_band import BRIDGED_FRACTION, MASKED_FRACTION
+from tauscope.recording.conditioning import AllPass
+from tauscope.recording.conditioning.common_band import BRIDGED_FRACTION, MASKED_FRACTION, Decimator, HarmonicBand
 
 BANDS = [(1000.0, 5.0), (1000.0, 37.0), (1000.0, 110.0), (1000.0, 180.0), (50.0, 5.0), (100.0, 44.0), (187.3, 4.1)]
 

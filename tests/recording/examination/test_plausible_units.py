@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from recording.examination.sound_arms import record_sound_arm, with_limits
 from recording.recording_files import message_of
 from tauscope.recording import Recording, Samples, examine_recording
-from tauscope.recording.examination import find_implausible
+from tauscope.recording.examination.plausibility import find_implausible
 from tauscope.robot import JointLimits
 
 DEGREES = 180.0 / np.pi

@@ -29,7 +29,7 @@ from recording.recording_files import message_of
 from tauscope.errors import TauscopeError
 from tauscope.identification import document, identify
 from tauscope.recording import Recording, check_recording, examine_recording, open_recording
-from tauscope.recording.examination import mend_recording
+from tauscope.recording.examination.examine import mend_recording
 
 ROBOT = paper_robot()
 ARM, JUDGE = simulate(ROBOT, seed=1), simulate(ROBOT, seed=2)

@@ -283,7 +283,7 @@ def test_a_list_that_is_short_in_some_row_is_refused(tmp_path: Path) -> None:
 
 def test_every_preset_is_offered() -> None:
     from tauscope.recording.layout.presets import PRESET_OF
-    from tauscope.robot import PRESETS as NAMES
+    from tauscope.robot.recording_layout import PRESETS as NAMES
 
     assert tuple(PRESET_OF) == NAMES
     assert SimpleNamespace(**dict.fromkeys(NAMES))

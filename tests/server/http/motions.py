@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from tauscope.trajectory import MoveSegment, Trajectory, trajectory_json
+from tauscope.trajectory import Trajectory, trajectory_json
+from tauscope.trajectory.segments import MoveSegment
 
 ROBOT: dict[str, Any] = {
     "name": "two-joint-arm",

@@ -14,7 +14,8 @@ from server.http.serving import served
 from server.queue.paper_files import PAPER_ROBOT
 from server.queue.waiting import wait_until
 from shared_data import REPOSITORY
-from tauscope.trajectory import MoveSegment, Trajectory, trajectory_json
+from tauscope.trajectory import Trajectory, trajectory_json
+from tauscope.trajectory.segments import MoveSegment
 
 pytestmark = pytest.mark.realtime
 

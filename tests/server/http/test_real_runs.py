@@ -18,7 +18,8 @@ from server.http.serving import Served, served
 from server.queue.paper_files import PAPER_ROBOT
 from server.queue.waiting import wait_until
 from tauscope.recording import read_recording
-from tauscope.trajectory import MoveSegment, Trajectory, trajectory_json
+from tauscope.trajectory import Trajectory, trajectory_json
+from tauscope.trajectory.segments import MoveSegment
 
 pytestmark = pytest.mark.slow
 

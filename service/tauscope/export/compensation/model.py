@@ -22,11 +22,7 @@ _RATED_TORQUE = "rated_torque_nm"
 
 @dataclass(frozen=True)
 class DriveUnits:
-    """What one drive unit means at the joint; None where the robot file and the recording do not tell.
-
-    `torque_per_milliampere`: joint torque per mA of recorded current, sign of the wiring included [Nm or N per mA].
-    `torque_per_permille`: joint torque per 1/1000 of the motor's rated torque, sign included [Nm per ‰].
-    """
+    """Joint torque [Nm or N] of one mA, and of one ‰ of rated torque, signs included; None where not known."""
 
     torque_per_milliampere: float | None = None
     torque_per_permille: float | None = None
@@ -91,10 +87,7 @@ EQUATION = "tau = stiction*(2/pi)*atan(k_v*v) + stribeck*(2/pi)*atan(delta*v) + 
 
 @dataclass(frozen=True)
 class JointFriction:
-    """Friction of one joint and the constant beside it, equations (7), (8).
-
-    `stiction`, `stribeck`: τ_s, τ_sc [Nm or N]; their sum is the Coulomb level at speed.
-    """
+    """Friction (7), (8) of one joint and its constant; τ_s + τ_sc is the Coulomb level at speed [Nm or N]."""
 
     stiction: float
     stribeck: float
@@ -141,10 +134,7 @@ class CompensationModel:
 
 
 def check_friction(joint: str, friction: JointFriction) -> None:
-    """Refuse coefficients that are not finite and shapes without meaning.
-
-    Raises ExportError naming the joint and the coefficient.
-    """
+    """Raise ExportError, which names joint and coefficient, for one that is not finite or has no meaning."""
     for name in ("stiction", "stribeck", "viscous", "offset", "k_v"):
         if not math.isfinite(getattr(friction, name)):
             raise ExportError(f"joint {shown(joint)}: {name} is not finite; identify it from other data")
@@ -162,11 +152,7 @@ SCHEMA = "tauscope.compensation/1"
 
 
 def to_document(model: CompensationModel, effects: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
-    """The model as mappings, lists, strings and numbers, the same for JSON and YAML.
-
-    Coefficients stand three times: as joint torque, in mA and in ‰ of rated torque; the last two are None where the
-    unit is not known, and the joint's remarks say why.
-    """
+    """The model as plain data for JSON and YAML: coefficients as torque, in mA, in ‰ of rated torque, or None."""
     return {
         "schema": SCHEMA,
         "robot": model.robot,
@@ -249,11 +235,5 @@ def _coefficients(joint: JointCompensation, torque_per_unit: float | None, unit:
     """Coefficients divided by what one unit means at the joint; None where that is not known."""
     if torque_per_unit is None:
         return None
-    friction = joint.friction
-    return {
-        "unit": unit,
-        "stiction": friction.stiction / torque_per_unit,
-        "stribeck": friction.stribeck / torque_per_unit,
-        "viscous": friction.viscous / torque_per_unit,
-        "offset": friction.offset / torque_per_unit,
-    }
+    names = ("stiction", "stribeck", "viscous", "offset")
+    return {"unit": unit} | {name: getattr(joint.friction, name) / torque_per_unit for name in names}

@@ -68,7 +68,10 @@ def heading(model: CompensationModel) -> tuple[str, ...]:
         f"{EQUATION.replace('*', ' ')}, with the offset included.",
         "Joint numbers start at 1. v in rad/s, torque in Nm; of a prismatic joint v in m/s, force in N.",
         "",
-        *(_joint_line(number, joint) for number, joint in enumerate(model.joints, start=1)),
+        *(
+            " ".join([f"Joint {number}: {joint.name} ({joint.type}).", *(f"{each}." for each in joint.units.remarks)])
+            for number, joint in enumerate(model.joints, start=1)
+        ),
         "",
         *(f"Recording {source.name}, sha256 {source.sha256}." for source in model.recordings),
         *unit_functions(model)[1],
@@ -80,10 +83,6 @@ def row(joint: JointCompensation) -> tuple[float, ...]:
     """A joint's numbers in the order of `COEFFICIENTS`; δ is 0 where the joint has no Stribeck term."""
     values = {name: getattr(joint.friction, name) for name in COEFFICIENTS}
     return tuple(0.0 if values[name] is None else float(values[name]) for name in COEFFICIENTS)
-
-
-def _joint_line(number: int, joint: JointCompensation) -> str:
-    return f"Joint {number}: {joint.name} ({joint.type}). " + " ".join(f"{remark}." for remark in joint.units.remarks)
 
 
 _TWO_OVER_PI = "0.6366197723675814"  # the shortest decimal that reads back as 2/π rounded to float64

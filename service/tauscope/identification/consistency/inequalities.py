@@ -43,10 +43,7 @@ class FrictionColumns:
 
 
 def friction_inequalities(columns: FrictionColumns, size: int, joints: Sequence[str]) -> LinearInequalities:
-    """Friction that only dissipates: τ_s ≥ 0, τ_s + τ_sc ≥ c τ_s, τ_v ≥ 0 for every joint, and I_a ≥ 0 for every rotor.
-
-    τ_sc is the difference of Coulomb friction and stiction, c is `LEAST_COULOMB`; an offset is free.
-    """
+    """Dissipative friction: τ_s, τ_v, I_a ≥ 0 and τ_s + τ_sc ≥ c τ_s, c = `LEAST_COULOMB`; an offset is free."""
     demands: list[tuple[str, dict[int, float]]] = []
     rotors = columns.rotor_inertia or (None,) * len(joints)
     for name, stiction, stribeck, viscous, rotor in zip(

@@ -32,7 +32,6 @@ class ConsistentParameters:
     objective: float
     squared_residual: float  # ‖R x - z‖² [noise variances]
     free_squared_residual: float  # the least that any x, consistent or not, reaches [noise variances]
-    prior_squared_distance: float
     status: str
     duality_gap: float
     active_links: tuple[bool, ...]
@@ -54,14 +53,9 @@ def nearest_consistent_parameters(
 ) -> ConsistentParameters:
     """Nearest x to a weighted least-squares estimate such that every link can exist and G x ≤ h.
 
-    min ‖R x - z‖² + ‖W (x - μ)‖², pseudo-inertia ⪰ ε, G x ≤ h; see the module for ε. The program
-    is convex: there is one answer, and `duality_gap` certifies it. Raises IdentificationError where R or z is not
-    finite, where the inequalities contradict each other or leave no link that can exist, or where the solver does not
-    reach the accuracy that is asked for.
-
-    `factor`: (r, p), R, any factor of the weighted normal matrix RᵀR, whitened: a unit of R x is one standard deviation
-    of the noise. Columns: ten standard parameters for each link, then friction coefficients. Rank may be deficient.
-    `target`: (r,), z.
+    min ‖R x - z‖² + ‖W (x - μ)‖², pseudo-inertia ⪰ ε, G x ≤ h: convex, the answer certified by `duality_gap`. Raises
+    IdentificationError where inequalities contradict each other, or the solver is not accurate. `factor`: (r, p), R,
+    whitened: ten parameters a link, then friction coefficients; `target`: (r,), z.
     """
     inequalities = inequalities or LinearInequalities.none(prior.mean.size)
     _check_input(factor, target, prior, inequalities)
@@ -78,7 +72,6 @@ def nearest_consistent_parameters(
         objective=squared_residual + distance,
         squared_residual=squared_residual,
         free_squared_residual=_free_squared_residual(factor * prior.scale, target),
-        prior_squared_distance=distance,
         status=status,
         duality_gap=gap,
         active_links=tuple(bool(value <= _ACTIVE * MARGIN) for value in least),

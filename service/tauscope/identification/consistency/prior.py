@@ -121,10 +121,7 @@ def _measure_repair(robot: Robot, index: int) -> Array:
 
 
 def _deviation(link: LinkInertia, mass: float, length: float) -> Array:
-    """W of one link: svec(A⁻¹ J A⁻ᵀ) as a linear map of its parameters, (10, 10).
-
-    `mass`: mass of the body that measures it, at least the link's own [kg]; `length`: size of the link [m].
-    """
+    """W of one link, (10, 10): svec(A⁻¹ J A⁻ᵀ) by its parameters, A of a body of at least the link's own mass."""
     centre = link.first_moment / link.mass if link.mass > 0.0 else np.zeros(3)
     second_moment = np.zeros((3, 3))
     if link.mass > 0.0:
@@ -138,12 +135,7 @@ def _deviation(link: LinkInertia, mass: float, length: float) -> Array:
 
 
 def link_lengths(robot: Robot) -> Array:
-    """Size of each link: the distance of its two joints, and at least the chain's mean such distance.
-
-    Housings are as large where axes meet.
-
-    Returns (n,), lengths [m], positive.
-    """
+    """Size of each link, (n,) [m]: the distance of its two joints, and at least the chain's mean such distance."""
     spans = np.array([np.linalg.norm(np.subtract(*_joint_positions(robot, j))) for j in range(robot.link_count)])
     apart = spans[spans > 0.0]
     smallest = float(apart.mean()) if apart.size else 0.0

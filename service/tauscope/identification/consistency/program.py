@@ -48,18 +48,12 @@ class ConicProgram:
     link_count: int
 
     def slacks(self, scaled: Array) -> Array:
-        """What is left of each inequality, in scaled parameters.
-
-        `scaled`: (p,), u. Returns (k,), negative where an inequality is violated.
-        """
+        """What is left of each inequality, (k,), at `scaled`, (p,); negative where it is violated."""
         count = len(self.names)
         return self.bound[:count] - self.matrix[:count] @ scaled
 
     def smallest_eigenvalues(self, scaled: Array) -> Array:
-        """Smallest eigenvalue of each link's scaled pseudo-inertia.
-
-        `scaled`: (p,), u. Returns (n,), ε on the boundary.
-        """
+        """Least eigenvalue of each pseudo-inertia, (n,), at `scaled`, (p,); ε on the boundary."""
         links = (LinkInertia.from_vector(scaled[10 * j : 10 * j + 10]) for j in range(self.link_count))
         return np.array([np.linalg.eigvalsh(pseudo_inertia(link))[0] for link in links])
 
@@ -72,10 +66,7 @@ class ConicProgram:
 def assemble(
     factor: Array, target: Array, prior: Prior, inequalities: LinearInequalities, *, margin: float
 ) -> ConicProgram:
-    """Put information, prior and constraints together, in parameters scaled by the prior's magnitudes.
-
-    `factor`: (r, p), R, whitened; `target`: (r,), z.
-    """
+    """The program of a whitened `factor` (r, p) and `target` (r,), scaled by the prior's magnitudes."""
     size, link_count = prior.mean.size, prior.link_count
     information = np.column_stack([factor * prior.scale, target])
     belief = np.column_stack([prior.root * prior.scale, prior.root @ prior.mean])
@@ -97,14 +88,7 @@ def assemble(
 
 
 def solve(program: ConicProgram) -> tuple[Array, str, float]:
-    """The optimum of a program.
-
-    Raises IdentificationError where the inequalities contradict each other, or the solver does not reach the accuracy
-    asked for.
-
-    Returns u at the optimum, (p,); "interior" where no constraint is felt, else the solver's word; and the duality gap,
-    relative to the criterion or to 1.
-    """
+    """The optimum u, (p,), "interior" or the solver's word, and duality gap. Raises IdentificationError without one."""
     interior = solve_triangular(program.triangle, program.centre)
     if program.admits(interior):
         return interior, "interior", 0.0

@@ -16,11 +16,9 @@ _ROWS, _COLUMNS = np.array(UPPER_TRIANGLE).T
 
 
 def triangle_of_parameters() -> Array:
-    """Matrix B with svec(J) = B Θ: the scaled upper triangle of J as a linear map of a link's standard parameters.
+    """Matrix B, (10, 10), with svec(J) = B Θ, rows as `UPPER_TRIANGLE`, columns as `STANDARD_PARAMETERS`.
 
     Off-diagonal entries carry √2, so that ⟨svec(X), svec(Y)⟩ = tr(X Y), as clarabel's PSDTriangleConeT wants it.
-
-    Returns (10, 10), B; rows in the order of `UPPER_TRIANGLE`, columns in the order of `STANDARD_PARAMETERS`.
     """
     weight = np.where(_ROWS == _COLUMNS, 1.0, np.sqrt(2.0))
     units = (pseudo_inertia(LinkInertia.from_vector(unit)) for unit in np.eye(10))
@@ -28,10 +26,7 @@ def triangle_of_parameters() -> Array:
 
 
 def congruence(transform: Array) -> Array:
-    """Matrix K with svec(T X Tᵀ) = K svec(X).
-
-    `transform`: (4, 4), T. Returns (10, 10), K; rows and columns in the order of `UPPER_TRIANGLE`.
-    """
+    """Matrix K, (10, 10), with svec(T X Tᵀ) = K svec(X); `transform`: (4, 4), T."""
     weight = np.where(_ROWS == _COLUMNS, 1.0, np.sqrt(2.0))
     both = transform[_ROWS][:, _ROWS] * transform[_COLUMNS][:, _COLUMNS]
     crossed = transform[_ROWS][:, _COLUMNS] * transform[_COLUMNS][:, _ROWS]
@@ -44,8 +39,5 @@ def identity_triangle() -> Array:
 
 
 def parameter_scale(mass: float, length: float) -> Array:
-    """Magnitude of each standard parameter of a link of the given mass and size: m ℓ², m and m ℓ.
-
-    `mass`: m [kg]; `length`: ℓ [m]. Returns (10,), in the order of `STANDARD_PARAMETERS`.
-    """
+    """Magnitudes m, m ℓ and m ℓ² of a link's standard parameters, (10,); m [kg], ℓ [m]."""
     return mass * np.array([length**2] * 6 + [1.0] + [length] * 3)

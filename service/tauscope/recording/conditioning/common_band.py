@@ -35,10 +35,7 @@ class BandFilter(ABC):
 
     @abstractmethod
     def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Which of the M outputs rest on measured samples, (..., N) → (..., M).
-
-        `measured`: (..., N), where a sample was measured.
-        """
+        """Which of the M outputs rest on `measured` samples, (..., N) → (..., M)."""
 
     def filtered_white(self, lags: int) -> Array | None:
         """Autocovariance of white noise that passed, up to a factor, (lags + 1,); None where it is white still."""
@@ -74,11 +71,7 @@ class Decimator(BandFilter):
 
     @staticmethod
     def design(rate_hz: float, cutoff_hz: float) -> "Decimator":
-        """The decimator for one band.
-
-        `rate_hz`: sampling rate of the signals [Hz]; `cutoff_hz`: where half the amplitude is left [Hz]; full stop from
-        1.5 times that on, at or below the new Nyquist frequency.
-        """
+        """The decimator with half the amplitude left at `cutoff_hz`, and full stop from 1.5 times that on."""
         factor = max(1, int(rate_hz / (3.0 * cutoff_hz) + 1e-9))
         length, beta = signal.kaiserord(STOP_BAND_DB, 2.0 * cutoff_hz / rate_hz)
         # An even number of taps has a zero at Nyquist, which nothing but a decimation asks for.
@@ -87,10 +80,7 @@ class Decimator(BandFilter):
         return Decimator(kernel / kernel.sum(), factor, rate_hz / factor)
 
     def reduce(self, values: Array) -> Array:
-        """Signals filtered and decimated; only outputs whose whole kernel lies inside the signal.
-
-        `values`: (..., N), signals, time last. Returns (..., M), M = (N - K) // D + 1, or 0 where N < K.
-        """
+        """Outputs whose whole kernel lies inside `values`, (..., N) → (..., M), M = max((N - K) // D + 1, 0)."""
         blocks = len(self.kernel) // self.factor
         outputs = self._outputs(values.shape[-1])
         used = outputs + blocks - 1
@@ -108,10 +98,7 @@ class Decimator(BandFilter):
         return result.reshape(*values.shape[:-1], outputs)
 
     def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Outputs that rest on measured samples: see `MASKED_FRACTION` and `BRIDGED_FRACTION`.
-
-        `measured`: (..., N), where a sample was measured.
-        """
+        """Outputs that rest on `measured` samples (..., N): see `MASKED_FRACTION`, `BRIDGED_FRACTION`."""
         if measured.all():
             return np.ones((*measured.shape[:-1], self._outputs(measured.shape[-1])), dtype=bool)
         weight = np.abs(self.kernel)
@@ -156,18 +143,12 @@ class HarmonicBand(BandFilter):
         return HarmonicBand(period_samples, harmonics, (2 * harmonics + 1) * rate_hz / period_samples)
 
     def reduce(self, values: Array) -> Array:
-        """Signals of one period, band-limited and resampled to 2h + 1 points.
-
-        `values`: (..., N), one period, time last.
-        """
+        """One period of `values` (..., N), band-limited and resampled to 2h + 1 points."""
         spectrum = np.fft.rfft(values, axis=-1)[..., : self.harmonics + 1]
         count = 2 * self.harmonics + 1
         return np.fft.irfft(spectrum, n=count, axis=-1) * (count / self.period_samples)
 
     def reduce_mask(self, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """All True where the whole period was measured, but for `MASKED_FRACTION`: a harmonic needs all of it.
-
-        `measured`: (..., N), where a sample was measured in at least one period.
-        """
+        """All True where the period was `measured`, (..., N), but for `MASKED_FRACTION` of it."""
         whole = measured.mean(axis=-1, keepdims=True) >= 1.0 - MASKED_FRACTION
         return np.broadcast_to(whole, (*measured.shape[:-1], 2 * self.harmonics + 1))

@@ -6,6 +6,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from pydantic import Field
 
 from tauscope.errors import RecordingError
 from tauscope.recording.conditioning.motion import Motion, Trim, average_motion, transient_motion
@@ -22,27 +23,25 @@ from tauscope.recording.conditioning.timing import PeriodRun, Timing, find_stret
 from tauscope.recording.conditioning.uniform import Mask, Stretch, read_stretch, uniform_grid
 from tauscope.recording.recording import Array, Recording, Samples
 from tauscope.robot.robot import Robot
+from tauscope.strict_model import ResultModel, take_fields
 
 
-@dataclass(frozen=True)
-class ConditioningSummary:
-    """What was done to one recording, for the result and its reader.
+class ConditioningEntry(ResultModel):
+    """What was done to one recording, and what was missing in it."""
 
-    `missed_torques`: per joint, samples without a torque (filled in for filtering, not counted in the fit).
-    `position_noise_std`: per joint, standard deviation of the position noise over the whole spectrum [rad or m].
-    """
-
-    recording: str
-    samples: int
-    missed_positions: int
-    dropped: int
-    missed_torques: tuple[int, ...]
-    gaps: int
-    rate_hz: float
-    resampled: bool
-    averaged_periods: int
-    position_noise_std: tuple[float, ...]
-    velocity_source: tuple[str, ...]
+    recording: str = Field(description="name as given")
+    samples: int = Field(description="rows in the file")
+    missed_positions: int = Field(description="rows without a complete position: bridged or split, and masked")
+    missed_torques: list[int] = Field(description="per joint, samples without a torque: masked")
+    dropped: int = Field(description="rows in pieces too short to filter")
+    gaps: int = Field(description="long gaps at which the recording was split")
+    rate_hz: float = Field(description="sampling rate [Hz]")
+    resampled: bool = Field(description="whether stamps jittered so that signals were interpolated")
+    averaged_periods: int = Field(description="periods averaged into one; 0 where none were")
+    position_noise_std: list[float] = Field(description="per joint, noise of the positions [rad or m]")
+    velocity_source: list[str] = Field(
+        description="per joint, what q̇ and q̈ were taken from: position, recorded velocity or recorded acceleration"
+    )
 
 
 WINDOW_ROWS = 1 << 15  # rows conditioned at once: bounds memory whatever the recording's length
@@ -62,25 +61,19 @@ RESOLVED_STD = 4.0  # standard deviations of a position's noise that are motion
 
 @dataclass(frozen=True, eq=False)
 class Conditioner:
-    """One recording, surveyed once, from which conditioned motion can be drawn at any band.
-
-    state_hz : (n,) float64 or None
-        cut-off of the smoothing of motion that is not averaged, joint by joint [Hz]; by the common band's where None
-    """
+    """One recording, surveyed once, from which conditioned motion can be drawn at any band."""
 
     recording: Recording
     robot: Robot
     timing: Timing
     noise: PositionNoise
     source: MotionSource
+    # (n,) or None, cut-off of the smoothing of motion that is not averaged, by joint [Hz]
     state_hz: Array | None = None
 
     @staticmethod
     def survey(recording: Recording, robot: Robot) -> "Conditioner":
-        """Find the usable stretches of a recording, the noise of its positions and the best source of its motion.
-
-        Raises RecordingError where nothing in the recording is long enough to be used.
-        """
+        """Find stretches, noise and source of the motion. Raises RecordingError where no stretch is long enough."""
         timing = find_stretches(recording)
         spans = _spread_windows(timing.rows)
         step = encoder_step([recording.samples(*span).position for span in spans])
@@ -91,10 +84,7 @@ class Conditioner:
         return Conditioner(recording, robot, timing, noise, source)
 
     def as_one_motion(self, state_hz: Array | None) -> "Conditioner":
-        """The same recording with no period averaged: each repetition of a motion counts as the motion that it was.
-
-        `state_hz`: (n,), cut-off of the motion's own smoothing, joint by joint [Hz]; by the common band's where None.
-        """
+        """The same recording with no period averaged, smoothed at `state_hz`, (n,) [Hz]."""
         return replace(self, timing=replace(self.timing, runs=()), state_hz=state_hz)
 
     @property
@@ -125,12 +115,7 @@ class Conditioner:
                 yield self.recording.samples(first, min(first + WINDOW_ROWS, stop))
 
     def motions(self, cutoff_hz: float | None) -> Iterator[Motion]:
-        """The recording's motion, piece by piece, in one band.
-
-        Raises RecordingError where the band is so narrow that nothing of the recording is left.
-
-        `cutoff_hz`: cut-off of the band that torque and regressor share [Hz]; None for no filter.
-        """
+        """The motion, piece by piece, in one band. Raises RecordingError where the filters' edges take all of it."""
         found = False
         for rows in self.timing.rows:
             for motion in self._stretch_motions(rows, cutoff_hz):
@@ -143,29 +128,24 @@ class Conditioner:
                 " record longer or ask for a higher cut-off"
             )
 
-    def summary(self, cutoff_hz: float | None) -> ConditioningSummary:
-        """Counts of what was missing and what was averaged.
-
-        `cutoff_hz`: the band [Hz]; whether periods are averaged depends on it.
-        """
+    def summary(self, cutoff_hz: float | None) -> ConditioningEntry:
+        """What was missing, and what was averaged in this band."""
         missed, resampled = np.zeros(self.robot.joint_count, int), False
         for samples in self.usable_samples():
             missed += np.isnan(samples.effort, order="F").sum(axis=0)
             time = samples.time[samples.complete]
             resampled = resampled or bool(len(time) > 1 and uniform_grid(time - time[0], self.timing.rate_hz) is None)
         groups = (self._average(group, cutoff_hz) for rows in self.timing.rows for group in self._groups(rows))
-        return ConditioningSummary(
+        return take_fields(
+            ConditioningEntry,
+            self.timing,
             recording=self.recording.name,
-            samples=self.timing.samples,
             missed_positions=self.timing.missed,
-            dropped=self.timing.dropped,
-            missed_torques=tuple(int(value) for value in missed),
-            gaps=self.timing.gaps,
-            rate_hz=self.timing.rate_hz,
+            missed_torques=missed.tolist(),
             resampled=resampled,
             averaged_periods=max((motion.repetitions for motion in groups if motion is not None), default=0),
-            position_noise_std=tuple(float(value) for value in self.position_noise_std),
-            velocity_source=tuple(str(name) for name in self.source.in_band(cutoff_hz).names),
+            position_noise_std=self.position_noise_std.tolist(),
+            velocity_source=[str(name) for name in self.source.in_band(cutoff_hz).names],
         )
 
     def _stretch_motions(self, rows: tuple[int, int], cutoff_hz: float | None) -> Iterator[Motion]:
@@ -217,10 +197,9 @@ class Conditioner:
         return periods if periods is not None and repeats(periods, highest, self.noise.density) else None
 
     def _transients(self, begin: int, end: int, rows: tuple[int, int], cutoff_hz: float | None) -> Iterator[Motion]:
-        """Motion of the rows begin:end in windows that join without a seam.
+        """Motion of the rows begin:end in windows that join without a seam: they overlap by what filters cost.
 
-        Consecutive windows overlap by what filters cost. Where averaged periods lie before or after, the filters run on
-        into them by half the kernel: an output belongs to where its kernel's centre lies.
+        Filters run on into averaged periods beside it by half the kernel: an output belongs to its kernel's centre.
         """
         trim = Trim.design(self.timing.rate_hz, cutoff_hz, self.state_hz)
         if end - begin < trim.factor:

@@ -23,15 +23,7 @@ def _low_pass(rate_hz: float, cutoff_hz: float) -> Array:
 
 
 def smooth(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
-    """Zero-phase low-pass, fourth-order Butterworth run forwards and backwards.
-
-    |H(f)| = 1 / (1 + (f/f_c)⁸).
-
-    `values`: (N, n), signals, a column each.
-    `rate_hz`: sampling rate [Hz].
-    `cutoff_hz`: f_c, where half the amplitude is left [Hz]; at or above 0.45 of the rate nothing is filtered.
-    Returns (N, n), the smoothed signals; the first and last `smoothing_margin` samples still feel the edge.
-    """
+    """Zero-phase low-pass of `values`, (N, n): |H(f)| = 1 / (1 + (f/f_c)⁸), fourth-order Butterworth both ways."""
     if cutoff_hz >= SMOOTHED_FRACTION * rate_hz:
         return values
     sections = _low_pass(rate_hz, cutoff_hz)
@@ -40,10 +32,7 @@ def smooth(values: Array, rate_hz: float, cutoff_hz: float) -> Array:
 
 
 def smooth_each(values: Array, rate_hz: float, cutoffs_hz: Array) -> Array:
-    """`smooth`, each signal in a band of its own.
-
-    `values`: (N, n), signals, a column each; `rate_hz`: sampling rate [Hz]; `cutoffs_hz`: (n,), f_c of each [Hz].
-    """
+    """`smooth` the columns of `values`, (N, n), each at a cut-off of its own, `cutoffs_hz`, (n,)."""
     smoothed = np.empty_like(values)
     for cutoff_hz in np.unique(cutoffs_hz):
         alike = cutoffs_hz == cutoff_hz
@@ -52,21 +41,14 @@ def smooth_each(values: Array, rate_hz: float, cutoffs_hz: Array) -> Array:
 
 
 def smoothing_margin(rate_hz: float, cutoff_hz: float) -> int:
-    """Samples at each end that `smooth` cannot be trusted with: the slowest pole has decayed to 0.1 %.
-
-    `rate_hz`, `cutoff_hz`: sampling rate and cut-off [Hz].
-    """
+    """Samples at each end that `smooth` cannot be trusted with: the slowest pole has decayed to 0.1 %."""
     if cutoff_hz >= SMOOTHED_FRACTION * rate_hz:
         return 0
     return int(np.ceil(3.0 * rate_hz / cutoff_hz))
 
 
 def derivative(values: Array, rate_hz: float) -> Array:
-    """First derivative in time by `CENTRAL_DIFFERENCE`.
-
-    `values`: (N, n), signals, a column each; `rate_hz`: sampling rate [Hz]. Returns (N, n), the derivative [1/s]; the
-    first and last `DIFFERENCE_MARGIN` rows are NaN.
-    """
+    """Time derivative of `values`, (N, n), by `CENTRAL_DIFFERENCE`; NaN in `DIFFERENCE_MARGIN` rows at each end."""
     result = np.full_like(values, np.nan)
     inner = len(values) - 2 * DIFFERENCE_MARGIN
     if inner <= 0:

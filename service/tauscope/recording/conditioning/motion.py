@@ -4,14 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tauscope.recording.conditioning import filters
 from tauscope.recording.conditioning.common_band import OPEN_BAND_FRACTION, AllPass, BandFilter, Decimator, HarmonicBand
-from tauscope.recording.conditioning.filters import (
-    DIFFERENCE_MARGIN,
-    STATE_BAND_RATIO,
-    derivative,
-    smooth_each,
-    smoothing_margin,
-)
 from tauscope.recording.conditioning.motion_source import MotionSource
 from tauscope.recording.conditioning.periods import Periods, fourier_derivatives
 from tauscope.recording.conditioning.uniform import Mask, Stretch
@@ -20,27 +14,19 @@ from tauscope.recording.recording import Array
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """One piece of conditioned motion with the torque that went with it.
+    """One piece of conditioned motion with the torque that went with it."""
 
-    `time`: (N,) [s]; of the first period where periods were averaged.
-    `position`, `velocity`, `acceleration`: (N, n), smoothed q, q̇, q̈ at the recorded rate.
-    `period`: (N,), progress through the repeated excitation, where it is known and not averaged: index of the period
-        plus the part of it that is over.
-    `scatter`: (n,), standard deviation of the positions from period to period [rad or m]; None where nothing was
-        averaged.
-    """
-
-    time: Array
-    position: Array
+    time: Array  # (N,) [s]; of the first period where periods were averaged
+    position: Array  # (N, n), smoothed q at the recorded rate; as are q̇, q̈
     velocity: Array
     acceleration: Array
     torque: Array  # (P, N, n), measured joint torque of every repetition; P = 1 where nothing was averaged
     measured: Mask  # (P, N, n), where that torque was measured and not filled in
     rate_hz: float  # sampling rate of all of these [Hz]
     band: BandFilter
-    period: Array | None = None
+    period: Array | None = None  # (N,), index of the period plus the part of it that is over; None where averaged
     own: slice = field(default_factory=lambda: slice(None))
-    scatter: Array | None = None
+    scatter: Array | None = None  # (n,), standard deviation of q from period to period [rad or m]; None: not averaged
 
     @property
     def repetitions(self) -> int:
@@ -59,29 +45,22 @@ class Motion:
 
 @dataclass(frozen=True)
 class Trim:
-    """The band of one recording's transient motion, and the samples that it costs.
-
-    `state_hz`: float or (n,), cut-off of the motion's own smoothing, of each joint if they differ [Hz]; the sampling
-        rate where nothing is smoothed.
-    """
+    """The band of one recording's transient motion, and the samples that it costs."""
 
     band: AllPass | Decimator
     cutoff_hz: float | None  # of the band [Hz]; None where it is open
+    # of the motion's own smoothing, of each joint if they differ [Hz]; the rate where nothing is smoothed
     state_hz: float | Array
     margin: int
 
     @staticmethod
     def design(rate_hz: float, cutoff_hz: float | None, state_hz: Array | None = None) -> "Trim":
-        """Band and margin for a cut-off.
-
-        `rate_hz`: sampling rate [Hz]; `cutoff_hz`: of the common band [Hz]; None for no filter; `state_hz`: (n,), of
-        the motion's own smoothing, joint by joint [Hz]; `state_cutoff` where None.
-        """
-        margin = 2 * DIFFERENCE_MARGIN
+        """Band and margin; `state_hz`: (n,), cut-off of the motion's own smoothing, `state_cutoff` where None."""
+        margin = 2 * filters.DIFFERENCE_MARGIN
         if cutoff_hz is None or cutoff_hz >= OPEN_BAND_FRACTION * rate_hz:
             return Trim(AllPass(rate_hz), None, rate_hz, margin)
         smoothing = state_cutoff(rate_hz, cutoff_hz) if state_hz is None else state_hz
-        margin += smoothing_margin(rate_hz, float(np.min(smoothing)))
+        margin += filters.smoothing_margin(rate_hz, float(np.min(smoothing)))
         return Trim(Decimator.design(rate_hz, cutoff_hz), cutoff_hz, smoothing, margin)
 
     @property
@@ -100,31 +79,25 @@ class Trim:
 
 
 def state_cutoff(rate_hz: float, cutoff_hz: float | None) -> float:
-    """Cut-off of the motion's own smoothing for a given common band.
-
-    `rate_hz`: sampling rate [Hz]; `cutoff_hz`: of the common band [Hz]; None for no filter.
-    """
-    return rate_hz / 2.0 if cutoff_hz is None else min(STATE_BAND_RATIO * cutoff_hz, rate_hz / 2.0)
+    """Cut-off [Hz] of the motion's own smoothing for a given common band."""
+    return rate_hz / 2.0 if cutoff_hz is None else min(filters.STATE_BAND_RATIO * cutoff_hz, rate_hz / 2.0)
 
 
 def transient_motion(stretch: Stretch, trim: Trim, source: MotionSource) -> Motion | None:
-    """Smoothed and differentiated motion of a stretch, edges trimmed.
-
-    Returns Motion or None: None where the stretch is too short for one output of the band.
-    """
+    """Smoothed and differentiated motion of a stretch; None where it is too short for one output of the band."""
     rate, count = stretch.rate_hz, len(stretch.position)
     if not trim.outputs(count):
         return None
     cutoffs = np.broadcast_to(trim.state_hz, stretch.position.shape[1])
-    position = smooth_each(stretch.position, rate, cutoffs)
-    velocity = derivative(position, rate)
+    position = filters.smooth_each(stretch.position, rate, cutoffs)
+    velocity = filters.derivative(position, rate)
     use_velocity = _usable(stretch.velocity, source.velocity)
     if stretch.velocity is not None and use_velocity.any():
-        velocity[:, use_velocity] = smooth_each(stretch.velocity[:, use_velocity], rate, cutoffs[use_velocity])
-    acceleration = derivative(velocity, rate)
+        velocity[:, use_velocity] = filters.smooth_each(stretch.velocity[:, use_velocity], rate, cutoffs[use_velocity])
+    acceleration = filters.derivative(velocity, rate)
     use_acceleration = _usable(stretch.acceleration, source.acceleration)
     if stretch.acceleration is not None and use_acceleration.any():
-        acceleration[:, use_acceleration] = smooth_each(
+        acceleration[:, use_acceleration] = filters.smooth_each(
             stretch.acceleration[:, use_acceleration], rate, cutoffs[use_acceleration]
         )
     inner = slice(trim.margin, count - trim.margin)
@@ -142,10 +115,7 @@ def transient_motion(stretch: Stretch, trim: Trim, source: MotionSource) -> Moti
 
 
 def average_motion(periods: Periods, cutoff_hz: float | None, source: MotionSource) -> Motion:
-    """One period for all: positions averaged, differentiated by their Fourier series, torques kept apart.
-
-    `cutoff_hz`: of the common band [Hz]; None for no filter.
-    """
+    """One period for all: positions averaged, differentiated by their Fourier series, torques kept apart."""
     rate, count = periods.rate_hz, periods.position.shape[1]
     cutoff = state_cutoff(rate, cutoff_hz)
     series = fourier_derivatives(periods.position.mean(axis=0), rate, cutoff, periods.advance)

@@ -61,15 +61,12 @@ class Source(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class MotionSource:
-    """What every joint's motion is made from, and the band that it stands.
+    """What every joint's motion is made from, and the band that it stands."""
 
-    `velocity`, `acceleration`: (n,), whether the recorded signal is used for q̇, for q̈.
-    `quieter_from_hz`: (n,), band from which on the recorded velocity is the quieter source; infinite where it never is.
-    """
-
-    velocity: np.ndarray
-    acceleration: np.ndarray
+    velocity: np.ndarray  # (n,), whether the recorded signal is used for q̇
+    acceleration: np.ndarray  # (n,), whether the recorded signal is used for q̈
     limits_hz: Array  # (n,), widest band in which q̈ keeps to `NOISE_SHARE`; infinite where it does everywhere
+    # (n,), band from which on the recorded velocity is the quieter source; infinite: never
     quieter_from_hz: Array | None = None
 
     def in_band(self, cutoff_hz: float | None) -> "MotionSource":
@@ -96,13 +93,8 @@ def choose_sources(stretches: Sequence[Stretch], noise: PositionNoise) -> Motion
     best = limits.copy()
     chosen = np.zeros((2, joint_count), dtype=bool)
     for order, used in ((1, chosen[0]), (0, chosen[1])):
-        recorded = [stretch.velocity if order else stretch.acceleration for stretch in stretches]
         for joint in range(joint_count):
-            pieces = [
-                (stretch.position[:, joint], values[:, joint])
-                for stretch, values in zip(stretches, recorded, strict=True)
-                if values is not None and np.isfinite(values[:, joint]).all()
-            ]
+            pieces = _whole_pieces(stretches, joint, order)
             if not pieces or not np.isfinite(limits[joint]):
                 continue
             rate = stretches[0].rate_hz
@@ -114,6 +106,16 @@ def choose_sources(stretches: Sequence[Stretch], noise: PositionNoise) -> Motion
     return MotionSource(chosen[0], chosen[1], limits, _quieter_bands(stretches, noise))
 
 
+def _whole_pieces(stretches: Sequence[Stretch], joint: int, order: int) -> list[tuple[Array, Array]]:
+    """Positions, and recorded velocity (order 1) or acceleration (0), of stretches where none is missing."""
+    recorded = [stretch.velocity if order else stretch.acceleration for stretch in stretches]
+    return [
+        (stretch.position[:, joint], values[:, joint])
+        for stretch, values in zip(stretches, recorded, strict=True)
+        if values is not None and np.isfinite(values[:, joint]).all()
+    ]
+
+
 def _quieter_bands(stretches: Sequence[Stretch], noise: PositionNoise) -> Array | None:
     """Band from which on each joint's recorded velocity is the quieter source, (n,) [Hz]; None without velocities.
 
@@ -123,18 +125,16 @@ def _quieter_bands(stretches: Sequence[Stretch], noise: PositionNoise) -> Array 
     bands, fits = np.full(joint_count, np.inf), []
     for joint in range(joint_count):
         limit = float(noise.joint_limits_hz[joint])
-        pieces = [
-            (stretch.position[:, joint], stretch.velocity[:, joint])
-            for stretch in stretches
-            if stretch.velocity is not None and np.isfinite(stretch.velocity[:, joint]).all()
-        ]
+        pieces = _whole_pieces(stretches, joint, 1)
         fit = _fit_velocity(pieces, rate, limit) if pieces and np.isfinite(limit) else None
         if fit is None:
             continue
         fits.append(fit)
         spectrum = acceleration_spectrum([values[:, None] for _, values in pieces], rate, 1)
         density, expected = float(spectrum.density[0]), float(noise.density[joint])
-        if fit.is_alike and expected > 0.0 and _is_flat(spectrum, rate) and _has_own_noise(fit, expected, rate):
+        # A velocity that was made from the positions carries their noise, too.
+        is_own = fit.misfit**2 >= OWN_NOISE * expected * _noise_gain(rate, fit.band_hz, 1)
+        if fit.is_alike and expected > 0.0 and _is_flat(spectrum, rate) and is_own:
             bands[joint] = max(np.sqrt(5.0 * density / (3.0 * expected)) / (2.0 * np.pi), limit)
     if not fits:
         return None
@@ -145,10 +145,7 @@ def _quieter_bands(stretches: Sequence[Stretch], noise: PositionNoise) -> Array 
 
 @dataclass(frozen=True)
 class _Fit:
-    """A recorded signal as x_recorded = g x - d ẋ + offset, x by the positions, in their band.
-
-    `delay`, `delay_std`: d and its standard error [s].
-    """
+    """x_recorded = g x - d ẋ + offset, x by the positions, in their band."""
 
     gain: float
     gain_std: float
@@ -163,10 +160,7 @@ class _Fit:
     def solve(
         matrix: Array, target: Array, rate_hz: float, band_hz: float, offset: float | None = None
     ) -> "_Fit | None":
-        """Least squares; None where the motion tells nothing.
-
-        `matrix`: (N, 2), x and ẋ, and ones as a third column where the offset is not known; `target`: (N,).
-        """
+        """Least squares of `matrix` (N, 2 or 3), x, ẋ and ones; None where the motion tells nothing."""
         scale = np.sqrt(np.mean(matrix**2, axis=0))
         if not (scale > 0.0).all() or not target.any() or np.linalg.matrix_rank(matrix / scale) < matrix.shape[1]:
             return None
@@ -222,11 +216,6 @@ def _fit_velocity(pieces: Sequence[tuple[Array, Array]], rate_hz: float, limit_h
     if not columns:
         return None
     return _Fit.solve(np.concatenate(columns), np.concatenate(targets), rate_hz, limit_hz)
-
-
-def _has_own_noise(fit: _Fit, density: float, rate_hz: float) -> bool:
-    """Whether the positions' noise shows in the difference: a velocity that was made from them carries it, too."""
-    return fit.misfit**2 >= OWN_NOISE * density * _noise_gain(rate_hz, fit.band_hz, 1)
 
 
 def _wider_band(

@@ -35,16 +35,12 @@ DIFFERENCE_ORDER = 2
 
 @dataclass(frozen=True, eq=False)
 class PositionNoise:
-    """Noise of the measured positions.
-
-    `limit_hz`: widest band in which the q̈ that is used keeps to `NOISE_SHARE`; None where the whole spectrum does.
-    `joint_limits_hz`: (n,), the same joint by joint; infinite where the whole spectrum does, or where the joint stands
-        still.
-    """
+    """Noise of the measured positions."""
 
     density: Array  # (n,), one-sided spectral density S_n [rad²/Hz or m²/Hz]
+    # widest band in which the q̈ that is used keeps to `NOISE_SHARE`; None where the whole spectrum does
     limit_hz: float | None
-    joint_limits_hz: Array
+    joint_limits_hz: Array  # (n,), the same by joint; infinite where the whole spectrum does, or where it stands still
     step: Array  # (n,), step that the encoder rounds to [rad or m]; zero where it shows none
 
 
@@ -58,10 +54,7 @@ class AccelerationSpectrum:
     density: Array  # (n,), one-sided spectral density of the signal's noise
 
     def widest_band(self, rate_hz: float) -> Array:
-        """Widest band in which noise keeps to `NOISE_SHARE` of q̈, (n,) [Hz]; infinite where it does everywhere.
-
-        `rate_hz`: sampling rate [Hz].
-        """
+        """Widest band in which noise keeps to `NOISE_SHARE` of q̈, (n,) [Hz]; infinite where all of it does."""
         usable = self.frequency <= PLATEAU[1] * rate_hz / 2.0
         edge = (self.frequency + self.frequency[1] / 2.0)[usable, None]  # a sum up to a line ends half a line beyond it
         noise = (self.density * np.cumsum(self.gain)[:, None])[usable]
@@ -79,10 +72,7 @@ class AccelerationSpectrum:
 
 
 def position_noise(stretches: Stretch | Sequence[Stretch], step: Array | None = None) -> PositionNoise:
-    """Noise density of every joint's position from the plateau of its spectrum, and the band that it allows.
-
-    `step`: (n,), the encoders' steps, as `encoder_step` finds them [rad or m].
-    """
+    """Density of the positions' noise, and the band that it allows; `step`: (n,), by `encoder_step`."""
     stretches = [stretches] if isinstance(stretches, Stretch) else list(stretches)
     rate = stretches[0].rate_hz
     floor = 0.0 if step is None else np.square(step) / (6.0 * rate)
@@ -95,10 +85,7 @@ def position_noise(stretches: Stretch | Sequence[Stretch], step: Array | None = 
 
 
 def lowest_limit(limits_hz: Array) -> float | None:
-    """The joint that stands least sets the band of all; None where none sets one.
-
-    `limits_hz`: (n,), joint by joint, infinite where there is none [Hz].
-    """
+    """The least of `limits_hz`, (n,); None where all are infinite."""
     lowest = float(limits_hz.min())
     return lowest if np.isfinite(lowest) else None
 
@@ -106,11 +93,7 @@ def lowest_limit(limits_hz: Array) -> float | None:
 def acceleration_spectrum(
     signals: Sequence[Array], rate_hz: float, order: int, floor: Array | float = 0.0
 ) -> AccelerationSpectrum:
-    """Spectrum of q̈ by differences of a measured signal.
-
-    `signals`: sequence of (N, n), pieces of q (order 2), q̇ (order 1) or q̈ (order 0); `rate_hz`: sampling rate [Hz];
-    `floor`: (n,) or float, least density of the signal's noise.
-    """
+    """Spectrum of q̈ by differences of q (order 2), q̇ (1), q̈ (0), (N, n); `floor`: (n,) or float, of its density."""
     accelerations = [np.diff(values, n=order, axis=0) * rate_hz**order for values in signals]
     length = min(SEGMENT, max(len(values) for values in accelerations))
     spectra = [segment_spectra(values, rate_hz, length) for values in accelerations]
@@ -148,13 +131,7 @@ def _gain(frequency: Array, rate_hz: float, order: int) -> Array:
 
 
 def segment_spectra(values: Array, rate_hz: float, length: int) -> Array:
-    """One-sided spectral densities of segments under a Hann window: Welch's, before their mean.
-
-    Segments overlap by half or a little more, so that no sample is left out; what is shorter is one segment.
-
-    `values`: (N, n), signals, a column each; `rate_hz`: sampling rate [Hz]. Returns (S, F, n), of every segment, its
-    mean removed; half the time of `scipy.signal.welch`, which goes from segment to segment.
-    """
+    """Spectral densities (S, F, n) of overlapping segments of `values`, (N, n); quicker than `scipy.signal.welch`."""
     whole, last = min(length, len(values)), max(len(values) - length, 0)
     begins = np.linspace(0, last, int(np.ceil(last / (length - length // 2))) + 1).astype(int)
     segments = np.lib.stride_tricks.sliding_window_view(np.ascontiguousarray(values.T), whole, axis=1)[:, begins]
@@ -166,10 +143,7 @@ def segment_spectra(values: Array, rate_hz: float, length: int) -> Array:
 
 
 def encoder_step(positions: Sequence[Array]) -> Array:
-    """Smallest difference between two positions that is no rounding error, (n,) [rad or m]; zero where there is none.
-
-    `positions`: sequence of (N, n), positions as they were recorded, never interpolated.
-    """
+    """Least difference of recorded positions beyond rounding, (n,) [rad or m]; pieces of (N, n), not interpolated."""
     columns = np.concatenate(positions).T
     return np.array([_smallest_difference(column[np.isfinite(column)]) for column in columns])
 

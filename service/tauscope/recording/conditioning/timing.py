@@ -41,11 +41,7 @@ class PeriodRun:
         return int((self.stop_s - self.start_s) / self.length_s + WHOLE_PERIOD)
 
     def within(self, rows: tuple[int, int], begin_s: float, end_s: float, interval_s: float) -> "PeriodRun":
-        """What of the run lies within a stretch; its `count` is 0 where nothing does.
-
-        `rows`: (int, int), rows of the stretch; `begin_s`, `end_s`: instants of its first sample and of the end of its
-        last one [s]; `interval_s`: time from sample to sample [s].
-        """
+        """What of the run lies within a stretch from `begin_s` to `end_s`; its `count` is 0 where nothing does."""
         slack = STEP_TOLERANCE * interval_s
         start = self.start_s if self.start_s > begin_s - slack else begin_s
         stop = self.stop_s if self.stop_s < end_s + slack else end_s
@@ -60,11 +56,7 @@ class PeriodRun:
         return self.first + (time_s - self.start_s) / self.length_s
 
     def progress(self, origin_s: float, elapsed: Array) -> Array:
-        """Index of the period plus the part of it that is over, (N,); NaN outside the run.
-
-        `origin_s`: an instant [s]; kept apart because epoch seconds would cost digits; `elapsed`: (N,), time since then
-        [s].
-        """
+        """Index of the period plus the part of it that is over, (N,), `elapsed` (N,) after an origin; NaN outside."""
         since = (origin_s - self.start_s) + elapsed
         slack = WHOLE_PERIOD * self.length_s
         inside = (since >= -slack) & (since < self.stop_s - self.start_s - slack)
@@ -80,11 +72,7 @@ class PeriodLabels:
     row: NDArray[np.int_]  # (K,) int, rows at which it changes
 
     def runs(self, rows: tuple[int, int], begin_s: float, end_s: float, interval_s: float) -> Iterator[PeriodRun]:
-        """The runs of periods of equal length within one stretch of a recording.
-
-        `rows`: (int, int), the stretch, as first and one-past-last row; `begin_s`, `end_s`: instants of its first
-        sample and of the end of its last one [s]; `interval_s`: time from sample to sample [s].
-        """
+        """The runs of periods of equal length within one stretch, from row rows[0] to before rows[1]."""
         first = max(int(np.searchsorted(self.row, rows[0], side="right")) - 1, 0)
         last = int(np.searchsorted(self.row, rows[1]))
         begin = np.maximum(self.time[first:last], begin_s)
@@ -157,13 +145,10 @@ SHORTEST_STRETCH = 32
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """How a recording was sampled.
-
-    `rows`: tuple of (int, int), row ranges without a long gap, each at least `SHORTEST_STRETCH` complete rows.
-    """
+    """How a recording was sampled."""
 
     rate_hz: float
-    rows: tuple[tuple[int, int], ...]
+    rows: tuple[tuple[int, int], ...]  # ranges without a long gap, each at least `SHORTEST_STRETCH` complete rows
     samples: int
     missed: int
     dropped: int
@@ -171,10 +156,7 @@ class Timing:
     runs: tuple[PeriodRun, ...] = ()
 
     def progress(self, origin_s: float, elapsed: Array) -> Array | None:
-        """Progress through the repeated excitation, (N,); NaN outside, None where nothing repeats in this time.
-
-        `origin_s`: an instant [s]; `elapsed`: (N,), time since then, increasing [s].
-        """
+        """Progress through the repeated excitation, `elapsed` (N,) after an origin; None where nothing repeats."""
         near = [run for run in self.runs if run.start_s < origin_s + elapsed[-1] and run.stop_s > origin_s + elapsed[0]]
         if not near:
             return None
@@ -185,10 +167,7 @@ class Timing:
 
 
 def find_stretches(recording: Recording) -> Timing:
-    """Row ranges of `recording` that can be filtered in one go.
-
-    Raises RecordingError where no stretch is long enough to be used.
-    """
+    """Row ranges that can be filtered in one go. Raises RecordingError where none is long enough."""
     interval, incomplete, labels = _scan(recording)
     count = len(recording) - len(incomplete)
     if count < SHORTEST_STRETCH:
@@ -197,7 +176,9 @@ def find_stretches(recording: Recording) -> Timing:
             " needed: check which q columns are empty"
         )
     typical, rate = _typical_interval(interval)
-    breaks = np.flatnonzero(interval > _longest_bridge(typical)) + 1
+    longest = max(min(BRIDGED_SAMPLES * typical, LONGEST_BRIDGE_S), BRIDGED_SECONDS)
+    longest = max(min(longest, MOST_BRIDGED_SAMPLES * typical), FEWEST_BRIDGED_SAMPLES * typical)
+    breaks = np.flatnonzero(interval > longest) + 1
     edges = np.concatenate([[0], breaks, [count]])
     long_enough = np.diff(edges) >= SHORTEST_STRETCH
     first, last = edges[:-1][long_enough], edges[1:][long_enough] - 1
@@ -206,7 +187,8 @@ def find_stretches(recording: Recording) -> Timing:
             f"{recording.name}: broken by {len(breaks)} gaps into pieces of fewer than {SHORTEST_STRETCH} samples:"
             " record again, or check column t"
         )
-    row = _row_of(np.concatenate([first, last]), incomplete)
+    complete = np.concatenate([first, last])  # of complete rows: each is as many further as incomplete ones before
+    row = complete + np.searchsorted(incomplete - np.arange(len(incomplete)), complete, side="right")
     rows = tuple((int(a), int(b) + 1) for a, b in zip(row[: len(first)], row[len(first) :], strict=True))
     dropped = count - int(np.sum(last - first + 1))
     runs = () if labels is None else _runs(recording, labels, rows, 1.0 / rate)
@@ -214,10 +196,7 @@ def find_stretches(recording: Recording) -> Timing:
 
 
 def row_at(recording: Recording, time_s: float, rows: tuple[int, int]) -> int:
-    """First of the rows that is not before an instant; the one after the last where all are.
-
-    `time_s`: the instant [s]; `rows`: (int, int), first and one-past-last row to look at.
-    """
+    """First of the rows that is not before an instant; the one after the last where all are."""
     found = bisect_left(range(*rows), time_s, key=lambda row: float(recording.table.rows(row, row + 1)[0, 0]))
     return rows[0] + found
 
@@ -266,16 +245,6 @@ def _is_last_digit(median_s: float, interval: Array) -> bool:
     steps = interval / median_s
     is_decimal = abs(np.log10(median_s) - np.rint(np.log10(median_s))) < 1e-3
     return bool(is_decimal and np.abs(steps - np.rint(steps)).max() < 1e-2)
-
-
-def _longest_bridge(typical_s: float) -> float:
-    longest = max(min(BRIDGED_SAMPLES * typical_s, LONGEST_BRIDGE_S), BRIDGED_SECONDS)
-    return max(min(longest, MOST_BRIDGED_SAMPLES * typical_s), FEWEST_BRIDGED_SAMPLES * typical_s)
-
-
-def _row_of(complete: NDArray[np.int_], incomplete: NDArray[np.int_]) -> NDArray[np.int_]:
-    """Rows of complete samples, counted among themselves: as many further as incomplete ones lie before them."""
-    return complete + np.searchsorted(incomplete - np.arange(len(incomplete)), complete, side="right")
 
 
 def _runs(

@@ -28,24 +28,17 @@ NEARBY = 0.75  # a grid point further than this, in sample intervals, from every
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Uniformly sampled motion without a long gap.
-
-    `position`, `torque`: (N, n), q [rad or m] and joint torque τ [Nm or N]; finite everywhere.
-    `period`: (N,), progress through the repeated excitation: index of the period plus the part of it that is over; NaN
-        outside.
-    `velocity`, `acceleration`: (N, n), recorded qd, qdd where there are such columns; a joint of which more than single
-        samples were missed is NaN throughout.
-    """
+    """Uniformly sampled motion without a long gap."""
 
     start_s: float
     rate_hz: float
-    position: Array
-    torque: Array
+    position: Array  # (N, n), q [rad or m], finite everywhere
+    torque: Array  # (N, n), joint torque τ [Nm or N], finite everywhere
     measured: Mask  # (N, n), False where a joint's torque was filled in and must not be counted
-    period: Array | None
+    period: Array | None  # (N,), index of the excitation period plus the part of it that is over; NaN outside
     resampled: bool
-    velocity: Array | None = None
-    acceleration: Array | None = None
+    velocity: Array | None = None  # (N, n), recorded qd; NaN for a joint of which more than single samples were missed
+    acceleration: Array | None = None  # (N, n), recorded qdd, as `velocity`
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +84,7 @@ def read_stretch(recording: Recording, robot: Robot, start: int, stop: int, timi
 
 
 def uniform_grid(elapsed: Array, rate_hz: float) -> Grid | None:
-    """The uniform grid that the samples lie on, as far as their stamps can tell.
-
-    `elapsed`: (N,), stamps relative to the first one [s]; `rate_hz`: nominal sampling rate [Hz]. Returns Grid or None:
-    None where the stamps deviate by more than `UNIFORM_TOLERANCE` and half of their own last digit.
-    """
+    """The uniform grid of stamps `elapsed`, (N,) since the first; None where they are off by `UNIFORM_TOLERANCE`."""
     tolerance = UNIFORM_TOLERANCE + 0.5 * _last_digit(elapsed) * rate_hz
     fits = [_fit_grid(index, elapsed, rate_hz) for index in _possible_indices(elapsed * rate_hz)]
     good = [(grid, deviation) for grid, deviation in fits if deviation <= tolerance]

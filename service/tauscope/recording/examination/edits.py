@@ -17,17 +17,13 @@ NO_ROWS: Rows = np.empty((0, 2), dtype=np.int64)
 
 @dataclass(frozen=True, eq=False)
 class ColumnEdit:
-    """Edits of one column.
+    """Edits of one column."""
 
-    `blank`: (k, 2) int64, rows start:stop that were never measured: NaN; ascending, disjoint.
-    `jumps`: (m,) int64, rows from which on the column is off by a constant.
-    `hold`: rows for which the source holds a value: those in between are on a straight line from one value to the next.
-    """
-
+    # (k, 2) int64, rows start:stop never measured; ascending, disjoint
     blank: Rows = field(default_factory=lambda: NO_ROWS)
-    jumps: Numbers = field(default_factory=lambda: NO_NUMBERS)
+    jumps: Numbers = field(default_factory=lambda: NO_NUMBERS)  # (m,) int64, rows from which on it is off by a constant
     offsets: Array = field(default_factory=lambda: np.empty(0))  # (m,), that constant: subtracted [rad or m]
-    hold: int = 0
+    hold: int = 0  # rows for which the source holds a value; those in between are on a line from one to the next
     fill: int = 0  # missed rows up to which a straight line is drawn
 
 

@@ -29,11 +29,7 @@ LEAST_MOVE = 0.01  # distance above which a joint moves within some rows [rad or
 
 
 def find_stuck(rows: Numbers, effort: Array, position: Array, scale: EffortScale) -> Numbers:
-    """Rows of a block in which one joint's effort is stuck.
-
-    `rows`: (N,) int64, row of each value within the recording; `effort`: (N,), in the recording's own unit, finite;
-    `position`: (N, n), q of all joints in the same rows [rad or m].
-    """
+    """Which `rows` (N,) of a joint's `effort` (N,) are stuck while any `position` (N, n) moves."""
     if scale.run > USUAL_RUN * scale.hold:
         return NO_NUMBERS
     change = np.diff(effort, prepend=np.nan)
@@ -43,10 +39,7 @@ def find_stuck(rows: Numbers, effort: Array, position: Array, scale: EffortScale
 
 
 def _leave_turns_out(stuck: Numbers, change: Array) -> Numbers:
-    """Rows of values that end with a jump: one that goes on by a single step of the drive's was turning, not stuck.
-
-    `change`: (N,), of the effort, from row to row.
-    """
+    """Rows of values that end with a jump: one that goes on by a single step of the drive's was turning, not stuck."""
     steps = np.abs(change[np.isfinite(change) & (change != 0.0)])
     if not len(stuck) or not len(steps):
         return stuck
@@ -57,11 +50,7 @@ def _leave_turns_out(stuck: Numbers, change: Array) -> Numbers:
 
 
 def find_all_stuck(rows: Numbers, effort: Array, position: Array, scales: Sequence[EffortScale]) -> Numbers:
-    """Rows of a block in which the efforts of several joints are stuck at once, whatever their level.
-
-    `rows`: (N,) int64, row of each value within the recording; `effort`: (N, n), in the recording's own unit;
-    `position`: (N, n), q of the same rows [rad or m].
-    """
+    """Which `rows` (N,) repeat the `effort` (N, n) of all joints at once, while any `position` (N, n) moves."""
     if len(scales) < 2 or not any(0 < scale.run <= USUAL_RUN * scale.hold for scale in scales):
         return NO_NUMBERS
     same = np.concatenate([[False], (effort[1:] == effort[:-1]).all(axis=1) & (effort[1:] != 0.0).any(axis=1)])
@@ -76,10 +65,7 @@ def _find_stuck_rows(rows: Numbers, same: NDArray[np.bool_], position: Array, le
 
 
 def find_spikes(rows: Numbers, effort: Array, scale: EffortScale) -> Numbers:
-    """Rows of a block in which one joint's effort is far from all of its neighbours.
-
-    `rows`: (N,) int64, row of each value within the recording; `effort`: (N,), in the recording's own unit, finite.
-    """
+    """Which `rows` (N,) have an `effort` (N,) of one joint far from all of their neighbours."""
     if scale.hold > 1:  # a held spike is as wide as the hold: one row of each run is judged, for all of them
         firsts = np.flatnonzero(is_new(effort))
         spikes = find_spikes(firsts, effort[firsts], replace(scale, hold=1))
@@ -136,19 +122,16 @@ class ZeroRuns:
                 else:
                     runs.append((start, stop))
 
-    @property
-    def _is_noisy(self) -> bool:
-        """Whether noise lets no effort stay at one value."""
-        return any(0 < scale.run <= USUAL_RUN * scale.hold and scale.change > 0.0 for scale in self._scales)
-
     def find_dropouts(self, recording: Recording) -> list[Rows]:
         """Ranges of rows that are dropouts, of every joint, (k, 2); they may overlap."""
         change = np.array([scale.change for scale in self._scales])
+        # Whether noise lets no effort stay at one value.
+        is_noisy = any(0 < scale.run <= USUAL_RUN * scale.hold and scale.change > 0.0 for scale in self._scales)
         *own, common = ([] if len(runs) > MOST_RUNS else runs for runs in self._runs)
         shared = [
             run
             for run in (common if len(own) > 1 else ())
-            if (self._is_noisy and run[1] - run[0] >= COMMON_ROWS and _is_gap(recording, run))
+            if (is_noisy and run[1] - run[0] >= COMMON_ROWS and _is_gap(recording, run))
             or (_measure_drops(recording, run) > COMMON_DROP * change).any()
         ]
         lost = [set(shared) for _ in own]

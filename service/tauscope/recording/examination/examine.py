@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 
 from tauscope.errors import RecordingError
-from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, EditedTable, Numbers
+from tauscope.number_text import counted
+from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, EditedTable
 from tauscope.recording.examination.plausibility import find_implausible
 from tauscope.recording.examination.scales import BLOCK_ROWS, joint_types
 from tauscope.recording.examination.scan import Defects, JointDefects, find_defects
@@ -57,7 +58,7 @@ def _describe_defects(recording: Recording, defects: Defects, joints: Sequence[s
         return f"first at t = {recording.samples(row, row + 1).time[0]:.6g} s"
 
     if len(defects.bunched):
-        text = f"column t: {_count(defects.bunched)} that waited for a later one"
+        text = f"column t: {counted(len(defects.bunched), 'row')} that waited for a later one"
         remedy = "stamp samples when they are measured, not when a buffer is emptied"
         yield ResultWarning(
             code="time-stamps", text=f"{text}, {begin(int(defects.bunched[0]))}; left out", remedy=remedy
@@ -93,7 +94,7 @@ def _describe_joint(
         yield "q", "encoder-reset", text, "home the encoder before the recording, and not within it"
     slow = "record at the rate of the controller"
     if len(repeated := joint.rows["repeated"]):
-        text = f"each value is held for about {joint.hold} rows; {_count(repeated)} masked"
+        text = f"each value is held for about {joint.hold} rows; {counted(len(repeated), 'row')} masked"
         yield "q", "held-samples", text, slow
     if joint.effort_hold > 1:
         text = f"each value is held for about {joint.effort_hold} rows; interpolated from change to change"
@@ -107,31 +108,21 @@ def _describe_joint(
     )
     for column, code, kind, words in masked:
         if len(rows := joint.rows[kind]):
-            yield column, code, f"{_count(rows)} {words}, {begin(int(rows[0]))}; masked", BUS
-
-
-def _count(rows: Numbers) -> str:
-    return "1 row" if len(rows) == 1 else f"{len(rows)} rows"
+            yield column, code, f"{counted(len(rows), 'row')} {words}, {begin(int(rows[0]))}; masked", BUS
 
 
 TRUST = "go on with --trust-units"
 
 
 def open_recording(path: str | Path, robot: Robot | None = None, reading: Reading = SI) -> Recording:
-    """Read a recording, convert its units, and examine it.
-
-    Raises RecordingError where the file cannot be read, a column can hardly be in its unit, or a joint has no effort.
-    """
+    """Read and examine a recording. Raises RecordingError where it cannot be read, or as `examine_recording`."""
     reading = reading.for_robot(robot)
     joints = None if robot is None else [joint.name for joint in robot.joints]
     return examine_recording(read_recording(path, None, joints, reading), robot, trust_units=reading.trust_units)
 
 
 def examine_recording(recording: Recording, robot: Robot | None = None, *, trust_units: bool = False) -> Recording:
-    """Examine a recording, and mend its samples; an examined one is returned as it is.
-
-    Raises RecordingError where a column can hardly be in its unit, or a joint has no effort.
-    """
+    """Mend samples, once. Raises RecordingError where a unit is implausible, or a joint has no effort."""
     if recording.is_examined:
         return recording
     missing = find_missing_effort(recording)
@@ -155,10 +146,7 @@ def examine_recording(recording: Recording, robot: Robot | None = None, *, trust
 
 
 def find_missing_effort(recording: Recording) -> str | None:
-    """The columns of effort that are NaN throughout, or zero at all joints, and what to do; None where there is none.
-
-    Position servos report zero for what they do not measure.
-    """
+    """Columns of effort that are NaN, or as of position servos zero, throughout, and what to do."""
     n, kind = recording.joint_count, recording.effort_kind.value
     seen, is_zero = np.zeros(n, dtype=bool), recording.effort_kind is not EffortKind.COMMAND
     for start in range(0, len(recording), BLOCK_ROWS):

@@ -82,11 +82,8 @@ def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> str | None:
         units = [f"{key}={unit}" for key, unit in named.items() if unit not in ("s", "rad", "m")]
         if position in ("deg", "mm") and speed in SI_LENGTHS:
             units.append(f"qd={speed}")
-        return _doubt(
-            column,
-            f"{evidence}, the ratio of {' and '.join(_name_foreign_units(time, position, speed))}",
-            ",".join(units),
-        )
+        ratio = " and ".join(_name_foreign_units(time, position, speed))
+        return _doubt(column, f"{evidence}, the ratio of {ratio}", ",".join(units))
     if abs(sketch.interval - 1.0) < 1e-9:
         text = f"rises by 1 from row to row, and {evidence}: it counts samples of about {1.0 / typical:.4g} Hz"
         return _doubt("t", text, "t=index --rate HZ")
@@ -117,7 +114,7 @@ def _name_foreign_units(time: str, position: str, speed: str) -> list[str]:
         "" if position in SI_LENGTHS else f"{position} to {'m' if position == 'mm' else 'rad'}",
         "" if speed in SI_LENGTHS else f"{speed} to {'m/s' if speed == 'mm' else 'rad/s'} in qd",
     )
-    return [each for each in words if each]
+    return [*filter(None, words)]
 
 
 def _doubt_time(sketch: Sketch) -> str | None:
@@ -125,9 +122,7 @@ def _doubt_time(sketch: Sketch) -> str | None:
     ratios = _velocity_ratios(sketch)
     if (np.abs(ratios - 1.0) < AGREEMENT).any():
         return None  # the recorded velocity vouches for the clock
-    interval = sketch.interval
-    moving = sketch.span > LEAST_SWEEP
-    moving &= sketch.top_speed > 0.0
+    interval, moving = sketch.interval, (sketch.span > LEAST_SWEEP) & (sketch.top_speed > 0.0)
     sweep = float(np.min(sketch.span[moving] / sketch.top_speed[moving])) if moving.any() else 0.0
     whole = "" if not moving.any() else f" and the fastest joint takes {sweep:.3g} s to cross its range"
     if interval >= 1.0 / SLOWEST_RATE_HZ or interval * sweep > SLOWEST:
@@ -151,14 +146,12 @@ def _doubt_angle(sketch: Sketch, types: list[JointType], robot: Robot | None) ->
     known = sketch.position[np.isfinite(sketch.position)]
     if len(known) and sketch.reach.max() > LARGEST_DEGREES and (known == np.rint(known)).all():
         joint = int(np.argmax(sketch.reach))
-        text = f"whole numbers up to {sketch.reach[joint]:.0f}, as counts of an encoder are"
-        return _doubt(f"q{joint + 1}", text)
+        return _doubt(f"q{joint + 1}", f"whole numbers up to {sketch.reach[joint]:.0f}, as counts of an encoder are")
     revolute = np.array([kind is JointType.REVOLUTE for kind in types])
     for kind, unit, factor in ((revolute, "deg", np.pi / 180.0), (~revolute, "mm", 1e-3)):
         found = _find_beyond_limits(sketch, kind, factor, robot)
         if found is not None:
-            joint, text = found
-            return _doubt(f"q{joint + 1}", text, f"q={unit}")
+            return _doubt(f"q{found[0] + 1}", found[1], f"q={unit}")
     slides = ~revolute & (sketch.reach > LONGEST_SLIDE)
     if slides.any():
         joint = int(np.argmax(slides))
@@ -182,7 +175,7 @@ def _doubt_angle(sketch: Sketch, types: list[JointType], robot: Robot | None) ->
 
 def _find_beyond_limits(sketch: Sketch, kind: np.ndarray, factor: float, robot: Robot | None) -> tuple[int, str] | None:
     """A joint that is beyond its limits most of the time, where another unit would keep all joints within theirs."""
-    limits = [None if robot is None else joint.limits.position for joint in robot.joints] if robot else []
+    limits = [joint.limits.position for joint in robot.joints] if robot else []
     beyond, judged = [], 0
     for joint, limit in enumerate(limits):
         position = sketch.position[:, joint]
@@ -209,9 +202,8 @@ def _find_beyond_limits(sketch: Sketch, kind: np.ndarray, factor: float, robot: 
 
 def _swings_in_degrees(sketch: Sketch, joint: int) -> bool:
     """Whether gravity's torque follows the angle as one in degrees, and not as one in radians."""
-    angle, slope, torque = (
-        values[:, joint] for values in (sketch.position_at_slope, sketch.slope, sketch.effort_at_slope)
-    )
+    angle = np.concatenate([window.position[1:-1, joint] for window in sketch.windows])
+    slope, torque = sketch.slope[:, joint], sketch.effort_at_slope[:, joint]
     known = np.isfinite(angle) & np.isfinite(slope) & np.isfinite(torque)
     if known.sum() < 10 * FEWEST_ROWS:
         return False
@@ -252,9 +244,13 @@ def find_implausible_torque(recording: Recording, sketch: Sketch, robot: Robot |
     if recording.effort_kind is EffortKind.COMMAND:
         return None
     if robot is not None and recording.effort_kind is EffortKind.CURRENT:
-        fault = _find_missing_constant(robot)
-        if fault is not None:
-            return fault
+        for number, joint in enumerate(robot.joints, 1):
+            if not joint.has_torque_constant and joint.torque_constant == 1.0:
+                return (
+                    f"column i{number}: holds current or drive units, and robot {robot.name} states no torque_constant"
+                    f" for joint {number} ({joint.name}); state joints[{number - 1}].torque_constant, Nm per recorded"
+                    " unit"
+                )
     return (
         _find_register(recording, sketch, robot)
         or _find_magnitude(recording, sketch)
@@ -262,20 +258,9 @@ def find_implausible_torque(recording: Recording, sketch: Sketch, robot: Robot |
     )
 
 
-def _find_missing_constant(robot: Robot) -> str | None:
-    for number, joint in enumerate(robot.joints, 1):
-        if not joint.has_torque_constant and joint.torque_constant == 1.0:
-            return (
-                f"column i{number}: holds current or drive units, and robot {robot.name} states no torque_constant for"
-                f" joint {number} ({joint.name}); state joints[{number - 1}].torque_constant, Nm per recorded unit"
-            )
-    return None
-
-
 def _find_register(recording: Recording, sketch: Sketch, robot: Robot | None) -> str | None:
     """Whole numbers that are too large for an arm of this size, or that lost their sign."""
-    effort = sketch.effort
-    known = np.isfinite(effort)
+    effort, known = sketch.effort, np.isfinite(sketch.effort)
     if not known.any() or not (effort[known] == np.rint(effort[known])).all():
         return None
     name = recording.effort_kind.value
@@ -288,11 +273,9 @@ def _find_register(recording: Recording, sketch: Sketch, robot: Robot | None) ->
         )
     if recording.effort_kind is EffortKind.CURRENT:
         return None
-    level = percentile(np.abs(effort), 95.0)
-    moved = level[known.any(axis=0)]
     reach = 3.2 if robot is None else _reach(robot, sketch)
     least = max(REGISTER_LEVEL, WRIST_SHARE * MASS_DENSITY * 9.81 * reach**4)
-    if moved.min() < least:
+    if percentile(np.abs(effort), 95.0)[known.any(axis=0)].min() < least:
         return None
     return (
         f"column {name}1: whole numbers of up to {np.nanmax(np.abs(effort)):.0f} at every joint, as a drive's register"

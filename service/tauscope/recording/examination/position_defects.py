@@ -34,14 +34,7 @@ class PositionDefect(NamedTuple):
 def scan_position(
     rows: Numbers, time: Array, position: Array, scale: PositionScale, interval: float, core: tuple[int, int]
 ) -> Iterator[PositionDefect]:
-    """Defects of a block of one joint's known positions.
-
-    `rows`: (N,) int64, row of each value within the recording.
-    `time`: (N,), stamps [s].
-    `position`: (N,), q [rad or m], finite.
-    `interval`: usual time from row to row [s].
-    `core`: (int, int), rows that this block answers for; the others are neighbours.
-    """
+    """Defects of one joint's known `position`, (N,), with its `rows` and `time`, (N,); `core`: rows to answer for."""
     if len(position) < 8:
         return
     plain = np.diff(position)
@@ -82,10 +75,7 @@ def _returns(surprise: Array, a: int, b: int) -> bool:
 
 
 def _count_frozen(steps: Array, calm: Array, k: int) -> int:
-    """Repeated rows before a step that makes up for them; 0 where it does not.
-
-    `calm`: (N,), the steps without jumps, from which speeds are taken [rad or m].
-    """
+    """Repeated rows before a step that makes up for them at speeds of `calm`, steps without jumps; else 0."""
     before, after = np.flatnonzero(steps[:k])[-CHANGES:], k + 1 + np.flatnonzero(steps[k + 1 :])[:CHANGES]
     if not len(before) or not len(after) or before[-1] == k - 1:
         return 0

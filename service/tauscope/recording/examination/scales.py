@@ -84,11 +84,6 @@ class Sketch:
         return np.concatenate([window.effort[1:-1] for window in self.windows])
 
     @cached_property
-    def position_at_slope(self) -> Array:
-        """Position of the rows of `slope`, (N, n)."""
-        return np.concatenate([window.position[1:-1] for window in self.windows])
-
-    @cached_property
     def top_speed(self) -> Array:
         """Largest |Δq/Δt| of every joint, (n,) [rad/s or m/s]; 0 where it is not known."""
         return np.fmax.reduce(np.abs(self.slope), axis=0, initial=0.0)
@@ -112,10 +107,7 @@ def joint_types(recording: Recording, robot: Robot | None) -> list[JointType]:
 
 
 def percentile(values: Array, share: float) -> Array:
-    """Percentile of every column's finite values, (n,); 0 where there are none.
-
-    `values`: (N, n), columns; `share`: percentile, 0 to 100.
-    """
+    """Percentile of the finite `values` (N, n) of every column, (n,); 0 where there are none."""
     few = values[:: max(1, len(values) // RANKED_ROWS)]
     known = [column[np.isfinite(column)] for column in few.T]
     return np.array([float(np.percentile(column, share)) if len(column) else 0.0 for column in known])
@@ -136,15 +128,12 @@ NEIGHBOURS = 3  # rows on either side that a row is judged by
 
 @dataclass(frozen=True)
 class PositionScale:
-    """Typical steps of one joint's position.
-
-    `surprise`: 90th percentile of the change beyond what the neighbours foretell, while the joint moves [rad or m].
-    """
+    """Typical steps of one joint's position."""
 
     is_wrapped: bool
     step: float  # encoder's step, or the least noise [rad or m]
     move: float  # 95th percentile of the change from row to row, while the joint moves [rad or m]
-    surprise: float
+    surprise: float  # 90th percentile of the change beyond what the neighbours foretell, while it moves [rad or m]
     hold: int  # rows for which the source holds a value; 1 where it does not
 
 
@@ -227,12 +216,7 @@ def neighbour_windows(values: Array) -> Array:
 
 
 def distance_beyond(windows: Array) -> Array:
-    """Distance of the middle value of every window beyond the range of the others, (N,); 0 within it.
-
-    The range leaves the highest and the lowest neighbour out, which may be a spike, too. A step lies within it.
-
-    `windows`: (N, 7), values and their neighbours.
-    """
+    """Distance of the middle of `windows`, (N, 7), beyond the others less their two extremes, (N,); 0 within."""
     values = windows[:, NEIGHBOURS]
     others = np.sort(np.delete(windows, NEIGHBOURS, axis=1), axis=1)
     return np.maximum(np.maximum(values - others[:, -2], others[:, 1] - values), 0.0)

@@ -7,19 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tauscope.recording.examination import scales
 from tauscope.recording.examination.edits import NO_NUMBERS, ColumnEdit, Numbers, Rows, join_ranges, row_numbers
 from tauscope.recording.examination.effort_defects import ZeroRuns, find_all_stuck, find_spikes, find_stuck
 from tauscope.recording.examination.position_defects import scan_position
-from tauscope.recording.examination.scales import (
-    BLOCK_ROWS,
-    BUNCHED,
-    EffortScale,
-    PositionScale,
-    Sketch,
-    is_new,
-    measure_efforts,
-    measure_positions,
-)
 from tauscope.recording.recording import Recording, Samples
 from tauscope.recording.samples import Array
 from tauscope.robot.robot import JointType
@@ -32,25 +23,17 @@ REST_HOLDS = 4  # holds of one value after which it is a rest, and no update tha
 
 @dataclass(eq=False)
 class JointDefects:
-    """Defects of one joint's samples.
+    """Defects of one joint's samples."""
 
-    `hold`, `effort_hold`: rows for which position, effort are held; 1 where they are not.
-    `rows`: dict of str to (m,) int64, rows, ascending: spikes, frozen, repeated of positions, zeros, stuck,
-        effort_spikes of efforts.
-    `jumps`, `wraps`: list of (int, float), first row behind a jump, and its height [rad or m].
-    """
-
-    hold: int
-    effort_hold: int
+    hold: int  # rows for which the position is held; 1 where it is not
+    effort_hold: int  # the same of the effort
+    # of spikes, frozen, repeated positions; of zeros, stuck, effort_spikes: (m,) int64, ascending
     rows: dict[str, Numbers] = field(default_factory=lambda: defaultdict(lambda: NO_NUMBERS))
-    jumps: list[tuple[int, float]] = field(default_factory=list)
-    wraps: list[tuple[int, float]] = field(default_factory=list)
+    jumps: list[tuple[int, float]] = field(default_factory=list)  # first row behind each, and its height [rad or m]
+    wraps: list[tuple[int, float]] = field(default_factory=list)  # as `jumps`
 
     def position_edit(self, count: int, lost: Numbers) -> ColumnEdit:
-        """Edit of the position of a recording of `count` rows: jumps are relative to the longest piece.
-
-        `lost`: (m,) int64, further rows to be masked.
-        """
+        """Edit of a position of `count` rows, further rows `lost` (m,): jumps count from the longest piece."""
         where, offsets = NO_NUMBERS, np.empty(0)
         if self.jumps or self.wraps:
             where = np.unique([0, *(row for row, _ in (*self.jumps, *self.wraps))])
@@ -77,19 +60,16 @@ class Defects:
 
 
 def find_defects(recording: Recording, types: list[JointType]) -> Defects:
-    """Find a recording's defects in memory that grows with their number only.
-
-    `types`: of the joints: only revolute ones wrap.
-    """
-    sketch = Sketch.of(recording)
-    positions, efforts = measure_positions(sketch, types), measure_efforts(sketch)
+    """Find a recording's defects in memory that grows with their number only."""
+    sketch = scales.Sketch.of(recording)
+    positions, efforts = scales.measure_positions(sketch, types), scales.measure_efforts(sketch)
     joints = [JointDefects(q.hold, tau.hold) for q, tau in zip(positions, efforts, strict=True)]
     has_effort, has_position = np.isfinite(sketch.effort).any(axis=1), np.isfinite(sketch.position).all(axis=1)
     alternate = bool(has_effort.any() and has_position.any() and not (has_effort & has_position).any())
     scan = _Scan(sketch, positions, efforts, Defects(joints, alternate), ZeroRuns(efforts))
     count = len(recording)
-    for start in range(0, count, BLOCK_ROWS):
-        stop = min(start + BLOCK_ROWS, count)
+    for start in range(0, count, scales.BLOCK_ROWS):
+        stop = min(start + scales.BLOCK_ROWS, count)
         first = max(start - SPARE_ROWS, 0)
         scan.add(recording.samples(first, min(stop + SPARE_ROWS, count)), first, (start, stop))
         scan.zeros.add(recording.samples(start, stop), start)
@@ -100,9 +80,9 @@ def find_defects(recording: Recording, types: list[JointType]) -> Defects:
 class _Scan:
     """One walk through a recording."""
 
-    sketch: Sketch
-    positions: list[PositionScale]
-    efforts: list[EffortScale]
+    sketch: scales.Sketch
+    positions: list[scales.PositionScale]
+    efforts: list[scales.EffortScale]
     defects: Defects
     zeros: ZeroRuns
     found: dict[tuple[int, str], list[Numbers]] = field(default_factory=dict)
@@ -120,7 +100,7 @@ class _Scan:
             position = np.ascontiguousarray(samples.position[:, joint])
             known = np.isfinite(position) & ~close
             if place.hold > 1:
-                known[known] = is_new(position[known])
+                known[known] = scales.is_new(position[known])
             interval = self.sketch.interval * place.hold
             for kind, row, height in scan_position(
                 rows[known], samples.time[known], position[known], scale, interval, core
@@ -159,10 +139,7 @@ class _Scan:
 
 
 def _sum_jumps(jumps: list[tuple[int, float]], where: Numbers, count: int) -> Array:
-    """Offset from each of some rows on, (m,): the sum of the jumps up to there, 0 in the longest piece between them.
-
-    `where`: (m,) int64, rows, ascending.
-    """
+    """Sum of the jumps up to each row of `where`, (m,); 0 in the longest piece between them."""
     ordered = sorted(jumps)
     starts = np.array([0, *(row for row, _ in ordered)], dtype=np.int64)
     heights = np.cumsum([0.0, *(height for _, height in ordered)])
@@ -175,7 +152,7 @@ def _find_bunched(time: Array, interval: float) -> NDArray[np.bool_]:
 
     They waited for the last one. Of two that are still at one instant, the second is one too many.
     """
-    is_close = np.diff(time, prepend=-np.inf) < BUNCHED * interval
+    is_close = np.diff(time, prepend=-np.inf) < scales.BUNCHED * interval
     if not is_close.any():
         return is_close
     offset, waited = time - interval * np.arange(len(time)), np.zeros(len(time), dtype=np.bool_)
@@ -183,7 +160,7 @@ def _find_bunched(time: Array, interval: float) -> NDArray[np.bool_]:
     line = np.percentile(_surround(offset)[near], 25.0, axis=1)
     waited[near] = np.abs(offset[near] - line) > OFF_THE_LINE * interval
     kept = np.flatnonzero(~waited)
-    waited[kept] = np.diff(time[kept], prepend=-np.inf) < BUNCHED * interval
+    waited[kept] = np.diff(time[kept], prepend=-np.inf) < scales.BUNCHED * interval
     return waited
 
 

@@ -29,22 +29,15 @@ _FOREIGN = {
     *_split("qfrc gravity error bias limit limits max min accelerometer imu"),
 }
 _QUALIFIERS = _split("present actual measured meas act raw filtered msr computed applied")
+_NO_NAMES = {*_CORES, *_COMMANDED, *_QUALIFIERS}  # they name a quantity or how it came about, and no joint
 # Words that make a family second choice.
 _LEVELS: Mapping[str, int] = {"computed": 1, "force": 2, "theta": 2, "load": 2, "state": 3, "axis": 4}
 _TIMES = _split("t time zeit timestamp stamp sim_time time_s seconds sec clock elapsed duration")  # the likeliest first
 _UNIT = re.compile(r"(?<![A-Za-z])(deg(?:rees?)?|mA|mNm|percent|pct)(?![A-Za-z])|([°%])")
 
 
-def is_joint_name(words: Sequence[str]) -> bool:
-    """Whether words may name a joint: none of them names a quantity, or says how it came about."""
-    return not any(word in _CORES or word in _COMMANDED or word in _QUALIFIERS for word in words)
-
-
 def role_of(words: Sequence[str]) -> tuple[str, int] | None:
-    """The group of CONTRACT.md that words name, and how far they are from the first choice; None where none.
-
-    The last word that names a quantity decides: ``actual_current_as_torque`` is a torque.
-    """
+    """The group of CONTRACT.md that the last word naming a quantity names, and its distance from the first choice."""
     if tuple(words[-2:]) == ("qfrc", "actuator"):  # the joint torque of MuJoCo's actuators
         return "tau", 0
     if _FOREIGN.intersection(words):
@@ -65,9 +58,8 @@ def role_of(words: Sequence[str]) -> tuple[str, int] | None:
 def time_rank(words: Sequence[str]) -> int | None:
     """How likely a column is the time; the least is the likeliest, None where it is none."""
     name = "_".join(word for word in words if word not in ("ms", "us", "ns", "s"))
-    for rank, time in enumerate(_TIMES):
-        if name == time:
-            return rank
+    if name in _TIMES:
+        return _TIMES.index(name)
     return next((len(_TIMES) + rank for rank, time in enumerate(_TIMES) if name.endswith(f"_{time}")), None)
 
 
@@ -180,7 +172,11 @@ def _find_segment_families(header: Sequence[str]) -> list[Family]:
     for column in header:
         for template, name in _segments(column):
             groups.setdefault(template, {})[name] = column
-    return [Family(template, tuple(c.values()), is_guessed=True) for template, c in groups.items() if _is_named(c)]
+    return [
+        Family(template, tuple(columns.values()), is_guessed=True)
+        for template, columns in groups.items()
+        if all(not name.isdecimal() and _NO_NAMES.isdisjoint(words_of(name)) for name in columns)
+    ]
 
 
 def _segments(column: str) -> list[tuple[str, str]]:
@@ -191,7 +187,3 @@ def _segments(column: str) -> list[tuple[str, str]]:
     if first > 0 and last < len(column) - 1 and not spans:
         spans = [(0, last), (first + 1, len(column))]
     return [(column[:start] + BY_NAME + column[stop:], column[start:stop]) for start, stop in spans]
-
-
-def _is_named(columns: Mapping[str, str]) -> bool:
-    return not any(key.isdecimal() or not is_joint_name(words_of(key)) for key in columns)

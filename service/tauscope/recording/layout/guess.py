@@ -24,10 +24,9 @@ def guess_layout(
     preset: str | None = None,
     prefers_torque: bool = False,
 ) -> RecordingLayout | None:
-    """The layout of a header; None where positions, efforts or commands, or the time are not among them.
+    """A header's layout; None without positions, efforts or commands, and time. `preset`: tool, None for any.
 
-    `joint_names`: of the robot; `preset`: tool that wrote the file; None for any; `prefers_torque`: whether commanded
-    torques go before currents, because no torque constant is known.
+    `prefers_torque`: whether commanded torques go before currents, because no torque constant is known.
     """
     found = guess_parts(header, joint_names, preset=preset, prefers_torque=prefers_torque)
     columns = found.columns if isinstance(found.columns, Mapping) else {}

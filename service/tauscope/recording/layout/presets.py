@@ -6,10 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Preset:
-    """How one tool names its columns.
-
-    `columns`: by group of CONTRACT.md, ends of the columns' names without the joint, their words joined by ``_``.
-    """
+    """One tool's ends of column names without the joint, words joined by ``_``, by group of CONTRACT.md; its units."""
 
     columns: Mapping[str, tuple[str, ...]]
     units: Mapping[str, str]  # as in a robot file

@@ -19,11 +19,7 @@ _EFFORTS = ("tau", "i")
 
 
 def rename_columns(header: Sequence[str], reading: Reading, file: str) -> list[str]:
-    """The header with the names of CONTRACT.md.
-
-    Raises RecordingError where the file has no column of a name that the mapping states. Raises RecordingMismatchError
-    where it names other joints than the robot, or numbers more of them.
-    """
+    """The header with the names of CONTRACT.md. Raises RecordingError for names or joints that it lacks."""
     columns = reading.columns
     if columns is None:
         return list(header)
@@ -113,7 +109,9 @@ class _Mapping:
             return self._known[name]
         if isinstance(source, int) and 0 < source <= len(self._header):
             return source - 1
-        raise RecordingError(f"{self._file}: columns: {target}: {self._absence(name)}")
+        near = difflib.get_close_matches(name, self._header, 1)
+        hint = f"did you mean {printable(near[0])}?" if near else f"the columns are {listed(self._header)}"
+        raise RecordingError(f"{self._file}: columns: {target}: no column is named {printable(name)}; {hint}")
 
     def _group(self, group: str, source: Source) -> Sequence[str | int]:
         if not isinstance(source, str | int):
@@ -123,7 +121,12 @@ class _Mapping:
             if template in self._known:
                 return [template]
             element = next(
-                (f"{template}[{joint}]" for joint in ("{0}", BY_NAME) if self._fits(f"{template}[{joint}]")), ""
+                (
+                    f"{template}[{joint}]"
+                    for joint in ("{0}", BY_NAME)
+                    if names_in(self._header, f"{template}[{BY_NAME}]")
+                ),
+                "",
             )
             template = element or template
         if BY_NAME in template:
@@ -153,14 +156,6 @@ class _Mapping:
                 "the columns in the order of the robot's joints"
             )
         return [fill_template(template, 0, name) for name in self._names]
-
-    def _fits(self, template: str) -> bool:
-        return bool(names_in(self._header, template.replace("{0}", BY_NAME)))
-
-    def _absence(self, name: str) -> str:
-        near = difflib.get_close_matches(name, self._header, 1)
-        hint = f"did you mean {printable(near[0])}?" if near else f"the columns are {listed(self._header)}"
-        return f"no column is named {printable(name)}; {hint}"
 
 
 def _split(target: str) -> tuple[str, str]:
