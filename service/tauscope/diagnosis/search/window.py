@@ -26,7 +26,11 @@ MOST = 0.5
 
 
 def window_log_odds(before: Hypothesis, after: Hypothesis, term: Term, laboratory: Laboratory) -> float:
-    """2 z² of the gain that the stretches of a window agree on; minus infinity where most of its excess stays."""
+    """2 z² of the gain that the stretches of a window agree on; minus infinity where most of its excess stays.
+
+    They agree where each gains in proportion to the energy of what the effect changes there: a half sine gains most in
+    its middle.
+    """
     rows, touched = laboratory.rows, term.effect.touched(len(before.scales))
     signals = [after.model.signals(piece) for piece in rows.observations]
     white = rows.columns(term.effect, term.shape[None], signals)
@@ -43,14 +47,18 @@ def window_log_odds(before: Hypothesis, after: Hypothesis, term: Term, laborator
         recording, instants = (each[rows.order[joint]][inside] for each in rows.observations.row_labels(joint))
         ranked = np.empty(len(instants), dtype=np.intp)
         ranked[np.lexsort((instants, recording))] = np.arange(len(instants))
-        gain = (first - second)[inside]
-        gains.append(gain[np.argsort(ranked)])
-        gained += float(gain.sum())
-        excess += float(first[inside].sum()) - level * len(gain)
-    stretches = min(STRETCHES, min(map(len, gains), default=0) // SHORTEST)
-    by_chance = CHANCE * np.sqrt(2.0 * sum(map(len, gains)))
+        changed = rows.take(joint, residuals[0][joint] - residuals[1][joint], 1.0) ** 2 / scale
+        gain = np.stack([first - second, changed])[:, inside]
+        gains.append(gain[:, np.argsort(ranked)])
+        gained += float(gain[0].sum())
+        excess += float(first[inside].sum()) - level * gain.shape[1]
+    lengths = [each.shape[1] for each in gains]
+    stretches = min(STRETCHES, min(lengths, default=0) // SHORTEST)
+    by_chance = CHANCE * np.sqrt(2.0 * sum(lengths))
     if stretches < FEWEST or gained <= 0.0 or gained < MOST * (excess - by_chance):
         return -np.inf
-    sums = np.sum([[part.sum() for part in np.array_split(each, stretches)] for each in gains], axis=0)
-    spread = float(np.sqrt(stretches) * sums.std(ddof=1))
+    sums = np.sum([[part.sum(axis=1) for part in np.array_split(each, stretches, axis=1)] for each in gains], axis=0)
+    own, energy = sums.T
+    apart = own - own.sum() * energy / energy.sum()
+    spread = float(np.sqrt(apart @ apart * stretches / (stretches - 1)))
     return 2.0 * (gained / spread) ** 2 if spread > 0.0 else -np.inf
