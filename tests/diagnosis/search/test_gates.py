@@ -27,6 +27,7 @@ class Trial:
     beside_friction: float = 0.0
     predicted: float = 10.0
     delivered: float = 20.0
+    tells: bool = True
     harm: float = 0.0
     lost: float | None = None
 
@@ -84,9 +85,11 @@ def holding(name: str) -> Any:
 
 def is_named(trial: Trial) -> bool:
     said = {"at": change(trial.held_out), "friction": change(trial.beside_friction)}
+    if not trial.tells:
+        said = {name: replace(each, error=np.full(JOINTS, np.inf)) for name, each in said.items()}
     held_out: Any = SimpleNamespace(
         change=lambda before, after: said[before.name],
-        trained_change=lambda before, after: change(trial.predicted, trial.harm),
+        trained_change=lambda before, after: change(trial.predicted, trial.harm) if trial.tells else said["at"],
         delivered_change=lambda before, after: change(trial.delivered),
     )
     proposal: Any = SimpleNamespace(term=holding("found").model.terms[0], log_factor=trial.training)
@@ -110,6 +113,8 @@ UNASKED = Trial(training=2.0, held_out=20.0)
         (replace(ASKED, held_out=0.5, beside_friction=1.5), True),  # where friction's slopes take its place
         (replace(ASKED, predicted=-1.0), False),  # by training alone no worse
         (replace(ASKED, delivered=0.0), True),  # whatever single samples say
+        (replace(ASKED, tells=False), True),  # which decide where the band has too few rows
+        (replace(ASKED, tells=False, delivered=0.5), False),
         (replace(ASKED, harm=0.5), False),  # at no other joint's cost
         (replace(ASKED, lost=0.5), True),  # without what it makes impossible
         (replace(ASKED, lost=5.0), False),  # but what is lost with that counts

@@ -124,15 +124,21 @@ def _doubts(finding: Finding, diagnosis: Diagnosis, names: Sequence[str]) -> Ite
 
 
 def _held_out(finding: Finding, names: Sequence[str], *, tentative: bool) -> str:
-    """What changes on held-out motion, at the joint that matters; empty without such motion."""
+    """What changes on held-out motion, at the joint that gains most and the one that loses most; empty without any."""
     change = finding.held_out_change
     doubt = "held-out motion does not confirm it" if tentative else ""
     if change is None:
         return doubt
     touched = list(finding.terms[0].effect.touched(len(names)))
-    worst = max(change.losing, key=lambda joint: change.relative[joint], default=None)
-    joint = worst if worst is not None else touched[int(np.argmin(change.relative[touched]))]
-    size = f"the held-out rms of {names[joint]} changes by {change_text(change.relative[joint], change.error[joint])}"
+    best = touched[int(np.argmin(change.relative[touched]))]
+    losing = (joint for joint in change.losing if joint != best)
+    worst = max(losing, key=lambda joint: change.relative[joint], default=None)
+    first, *others = (
+        f"of {names[joint]} changes by {change_text(change.relative[joint], change.error[joint])}"
+        for joint in (best, worst)
+        if joint is not None
+    )
+    size = ", that ".join([f"the held-out rms {first}", *others])
     return f"{doubt}: {size}" if doubt else size
 
 

@@ -82,6 +82,10 @@ class HeldOutChange:
         """Change in standard errors, (n,); zero where nothing changed."""
         return np.divide(self.relative, self.error, out=np.zeros_like(self.relative), where=self.error > 0.0)
 
+    def tells(self, joints: Sequence[int]) -> bool:
+        """Whether the motion is long enough to say anything of some joints."""
+        return bool(np.isfinite(self.error[list(joints)]).any())
+
     @property
     def losing(self) -> list[int]:
         """Joints that are predicted worse."""

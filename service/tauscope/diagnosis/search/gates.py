@@ -83,22 +83,22 @@ class Gates:
     def agrees(self, without: Hypothesis, at: Hypothesis, places: Sequence[int], *, asked: bool = True) -> bool:
         """Whether held-out motion shows an effect, and training predicts its joints no worse.
 
-        What training does not ask for has to be beyond doubt, also in the table that a user sees. No other motion shows
-        a window in time.
+        What training does not ask for has to be beyond doubt, also in the table that a user sees. That decides alone
+        where the band has too few rows. No other motion shows a window in time.
         """
         effect = at.model.terms[places[0]].effect
         if self.held_out is None or isinstance(effect, TimeLocalEffect):
             return True
         touched = effect.touched(len(at.scales))
-        if self.held_out.trained_change(without, at).log_odds(touched) < 0.0:
+        trained, least = self.held_out.trained_change(without, at), SHOWN if asked else UNASKED
+        tells = trained.tells(touched)
+        in_table = (asked and tells) or self.held_out.delivered_change(without, at).log_odds(touched) > least
+        if trained.log_odds(touched) < 0.0 or not in_table:
             return False
-        if not asked and self.held_out.delivered_change(without, at).log_odds(touched) < UNASKED:
-            return False
-        least = SHOWN if asked else UNASKED
         shown = self.held_out.change(without, at).log_odds(touched)
-        if shown <= least:
+        if shown <= least and tells:
             shown = self.held_out.change(self._hold_friction(at, places), at).log_odds(touched)
-        return shown > least
+        return shown > least or not tells
 
     def _hold_friction(self, at: Hypothesis, places: Sequence[int]) -> Hypothesis:
         """The hypothesis without an effect, friction's slopes as they are with it.
