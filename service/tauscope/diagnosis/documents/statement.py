@@ -130,12 +130,11 @@ def _held_out(finding: Finding, names: Sequence[str], *, tentative: bool) -> str
     if change is None:
         return doubt
     touched = list(finding.terms[0].effect.touched(len(names)))
-    best = touched[int(np.argmin(change.relative[touched]))]
-    losing = (joint for joint in change.losing if joint != best)
-    worst = max(losing, key=lambda joint: change.relative[joint], default=None)
+    losing = max(change.losing, key=lambda joint: change.relative[joint], default=None)
+    best = None if tentative and losing is not None else touched[int(np.argmin(change.relative[touched]))]
     first, *others = (
         f"of {names[joint]} changes by {change_text(change.relative[joint], change.error[joint])}"
-        for joint in (best, worst)
+        for joint in dict.fromkeys([best, losing])
         if joint is not None
     )
     size = ", that ".join([f"the held-out rms {first}", *others])
