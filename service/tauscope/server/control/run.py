@@ -77,20 +77,16 @@ class RunWorkspace(JobFolder[RunRequestRecord]):
         backend, mode = request.backend.name, request.options.mode.value
         write_record(self.folder, new_record(request.robot_name, backend, mode))
 
-    def read_run(self) -> RunRecord | None:
+    @override
+    def read_record(self) -> RunRecord | None:
         try:
             return read_record(self.control if self._has_begun else self.folder)
         except AcquisitionError:
             return None
 
-    @override
-    def has_ended(self) -> bool:
-        record = self.read_run()
-        return record is None or record.state.is_end
-
     def end_before_start(self, state: RunState, problem: RunProblem | None) -> None:
         """Write the end of a run that no control process was started for. Raises OSError if it cannot be written."""
-        record = self.read_run()
+        record = self.read_record()
         if record is None or record.state.is_end or self._has_begun:
             return
         write_record(self.folder, record.moved(RunState.STOPPING).moved(state, problem=problem))
@@ -105,7 +101,7 @@ class RunWorkspace(JobFolder[RunRequestRecord]):
 
     def problem(self) -> JobProblem | None:
         """Why the run did not finish, without the server's folders; None where nothing is known against it."""
-        record = self.read_run()
+        record = self.read_record()
         if record is None or record.problem is None:
             return None
         return JobProblem(code=record.problem.code, detail=self.in_user_terms(record.problem.detail))
@@ -114,7 +110,7 @@ class RunWorkspace(JobFolder[RunRequestRecord]):
         return without_folders(text, self.control, self.trajectories, self.robot, self.folder)
 
     def tell_end(self) -> None:
-        record = self.read_run()
+        record = self.read_record()
         if record is not None and record.state.is_end and not self.has_told_end():
             time = record.history[-1].at.astimezone(UTC)
             self.tell(EndedEvent(time=time, state=record.state, problem=self.problem()))

@@ -307,7 +307,7 @@ class RunManager(Manager[RunSupervisor]):
 
     def _end_supervised(self, workspace: RunWorkspace, claim: tuple[str, str] | None) -> None:
         self._end(workspace, claim)
-        record = workspace.read_run()
+        record = workspace.read_record()
         if record is not None:
             self._on_end(record)
 
@@ -336,7 +336,7 @@ class RunManager(Manager[RunSupervisor]):
         self._pending.pop(identifier, None)
 
     def _keep_recording(self, workspace: RunWorkspace) -> None:
-        path, record = workspace.recording("csv"), workspace.read_run()
+        path, record = workspace.recording("csv"), workspace.read_record()
         if record is not None and record.state.is_end and path.is_file():
             name = run_recording_name(workspace.folder.name)
             self._recordings.keep(KeptFile(path, name, path.stat().st_size, hash_file(path)))

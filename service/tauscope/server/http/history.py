@@ -14,7 +14,7 @@ from tauscope.server.history.drift import Drift, ParameterTrend, find_largest_by
 from tauscope.server.history.gates import Gate, ModelPolicy
 from tauscope.server.history.model_history import ModelEntry, ModelEventEntry
 from tauscope.server.history.model_judgement import compare_models
-from tauscope.server.http.answers import AnswerModel, Identifier, Limit, collection
+from tauscope.server.http.answers import ROOT, AnswerModel, Identifier, Limit
 from tauscope.server.http.bodies import read_document
 from tauscope.server.http.openapi import json_request
 from tauscope.server.http.services import Services, ServicesDep
@@ -68,8 +68,8 @@ class EventListAnswer(AnswerModel):
     events: list[ModelEventEntry] = Field(description="the newest first")
 
 
-def make_model_answer(entry: ModelEntry, collection: str) -> ModelAnswer:
-    here = f"{collection}/{entry.identifier}"
+def make_model_answer(entry: ModelEntry) -> ModelAnswer:
+    here = f"{ROOT}/models/{entry.identifier}"
     links = ModelLinksAnswer(self=here, document=f"{here}/document")
     return ModelAnswer.describe(entry, id=entry.identifier, links=links)
 
@@ -84,18 +84,18 @@ _WITH_REASON: Any = {"responses": _BODY_PROBLEMS, "openapi_extra": json_request(
 
 
 @router.get("/models", summary="List models")
-def list_models(request: Request, services: ServicesDep, robot: AnyRobot = None, limit: Limit = 100) -> ModelListAnswer:
+def list_models(services: ServicesDep, robot: AnyRobot = None, limit: Limit = 100) -> ModelListAnswer:
     """Every identification that was judged: the active one of each robot, those that were, those that were refused."""
     _bring_up_to_date(services)
     entries = services.models.history.models(robot, limit)
-    return ModelListAnswer(models=[make_model_answer(entry, request.url.path) for entry in entries])
+    return ModelListAnswer(models=[make_model_answer(entry) for entry in entries])
 
 
 @router.get("/models/{identifier}", summary="Look a model up", responses=problem_responses("not-found"))
-def get_model(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
+def get_model(identifier: Identifier, services: ServicesDep) -> ModelAnswer:
     """Its state and the gates that it had to pass; the identifier is the identification's."""
     _bring_up_to_date(services)
-    return make_model_answer(services.models.history.find(identifier), collection(request, 1))
+    return make_model_answer(services.models.history.find(identifier))
 
 
 @router.get(
@@ -191,7 +191,7 @@ async def _choose(request: Request, identifier: str, services: Services, role: s
     body = await read_document(request, ReasonRequest, services.settings.max_document_bytes)
     history, now = services.models.history, datetime.now(UTC)
     entry = await run_in_threadpool(history.activate, identifier, role, body.reason, now)
-    return make_model_answer(entry, collection(request, 2))
+    return make_model_answer(entry)
 
 
 def _bring_up_to_date(services: Services) -> None:

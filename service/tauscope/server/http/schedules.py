@@ -7,7 +7,7 @@ from fastapi import APIRouter, Path, Request
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
-from tauscope.server.http.answers import AnswerModel, Limit, collection
+from tauscope.server.http.answers import ROOT, AnswerModel, Limit
 from tauscope.server.http.bodies import read_document
 from tauscope.server.http.history import ReasonRequest
 from tauscope.server.http.openapi import json_request
@@ -91,10 +91,10 @@ _BODY_PROBLEMS = ("bad-request", "limit-exceeded", "media-type", "not-found")
 
 
 @router.get("", summary="List schedules")
-def list_schedules(request: Request, services: ServicesDep) -> ScheduleListAnswer:
+def list_schedules(services: ServicesDep) -> ScheduleListAnswer:
     """Those of every service that shares the database."""
     entries = services.schedules.repository.schedules()
-    return ScheduleListAnswer(schedules=[_answer(entry, request.url.path) for entry in entries])
+    return ScheduleListAnswer(schedules=[_answer(entry) for entry in entries])
 
 
 @router.put(
@@ -110,13 +110,13 @@ async def put_schedule(request: Request, name: Name, services: ServicesDep) -> S
     where the interlock objects; such a firing is skipped, and never repeated by itself.
     """
     body = await read_document(request, ScheduleRequest, services.settings.max_document_bytes)
-    return _answer(await run_in_threadpool(_put, name, body, services), collection(request, 1))
+    return _answer(await run_in_threadpool(_put, name, body, services))
 
 
 @router.get("/{name}", summary="Look a schedule up", responses=problem_responses("not-found"))
-def get_schedule(request: Request, name: Name, services: ServicesDep) -> ScheduleAnswer:
+def get_schedule(name: Name, services: ServicesDep) -> ScheduleAnswer:
     """What is repeated, and when it is due next."""
-    return _answer(services.schedules.repository.find(name), collection(request, 1))
+    return _answer(services.schedules.repository.find(name))
 
 
 @router.delete("/{name}", status_code=204, summary="Remove a schedule", responses=problem_responses("not-found"))
@@ -152,16 +152,16 @@ def _put(name: str, body: ScheduleRequest, services: Services) -> Schedule:
     return scheduler.repository.find(name)
 
 
-def _answer(entry: Schedule, path: str) -> ScheduleAnswer:
+def _answer(entry: Schedule) -> ScheduleAnswer:
     robot = entry.order.get("robot_name")
     return ScheduleAnswer.describe(
         entry,
         robot=robot if isinstance(robot, str) else None,
         definition=read_definition(entry),
-        firings=f"{path}/{entry.name}/firings",
+        firings=f"{ROOT}/schedules/{entry.name}/firings",
     )
 
 
 def _firing(entry: FiringEntry) -> FiringAnswer:
-    item = None if entry.item is None else f"/api/v1/{FOLDERS[entry.item[0]]}/{entry.item[1]}"
+    item = None if entry.item is None else f"{ROOT}/{FOLDERS[entry.item[0]]}/{entry.item[1]}"
     return FiringAnswer.describe(entry, item=item)

@@ -33,16 +33,11 @@ from tauscope.server.http.repeated_requests import StoredAnswers
 from tauscope.server.http.settings import Settings
 from tauscope.server.http.tasks.event_feeds import EventFeeds
 from tauscope.server.problems import ProblemError
-from tauscope.server.queue.analyses import (
-    IdentificationWorkspace,
-    run_diagnosis,
-    run_excitation,
-    run_identification,
-    run_rollout,
-)
+from tauscope.server.queue.analyses import HEAVY, TASKS, IdentificationWorkspace
 from tauscope.server.queue.cluster_executor import ClusterExecutor, open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
 from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.queue.task_job import perform_job
 from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.server.schedules.repository import ScheduleRepository
 from tauscope.server.schedules.scheduler import Repeater, Scheduler, new_boot
@@ -60,10 +55,8 @@ class Services:
     settings: Settings
     recordings: RecordingStore
     robots: RobotStore
-    identifications: JobKind
-    diagnoses: JobKind
-    rollouts: JobKind
-    excitations: JobKind
+    items: Mapping[str, ItemStore]
+    kinds: Mapping[str, JobKind]
     jobs: JobQueue
     runs: RunManager
     campaigns: CampaignManager
@@ -180,19 +173,22 @@ def _assemble(
     items, metrics, heartbeat = item_stores(settings.data_folder), Metrics(), Heartbeat()
     recordings = RecordingStore(settings.recordings_folder)
     recordings.tidy()
-    identifications, diagnoses, excitations, rollouts = kinds = _kinds(settings, items)
+    kinds = {
+        noun: JobKind(items[noun], partial(perform_job, kind, settings.recordings_folder), is_heavy=noun in HEAVY)
+        for noun, kind in TASKS.items()
+    }
     pool = executor or open_executor(settings.workers, deadline_s=settings.job_timeout_s)
     timed = TimedExecutor(pool, metrics.job_seconds)
     bounds: dict[str, Any] = {"slots": settings.workers, "most_waiting": settings.max_waiting}
     if isinstance(pool, ClusterExecutor):  # it comes and goes, and so do its workers
         bounds |= {"slots": lambda: pool.width, "is_there": pool.is_there}
-    jobs = JobQueue(kinds, timed, most_each=settings.max_jobs_per_caller, **bounds)
+    jobs = JobQueue([*kinds.values()], timed, most_each=settings.max_jobs_per_caller, **bounds)
     audit = AuditTrail(AuditLog(settings.data_folder))
     claims, closing = DeviceClaims(settings.max_arms), threading.Event()
     leases = Leases(claims, on_end=partial(_note_end, audit))
     start = start or partial(start_control, sim_socket=settings.sim_socket)
     runs = RunManager(items["run"], recordings, start, claims, heartbeat.is_alive, metrics.run_ended)
-    dependencies = CampaignDependencies(jobs, excitations, identifications, diagnoses, runs, recordings)
+    dependencies = CampaignDependencies(jobs, kinds, runs, recordings)
     campaigns = CampaignManager(items["campaign"], dependencies)
     models = ModelRegistry(ModelHistory(database), site, items)
     index = open_index(Index(database, site), items, recordings, settings.data_folder.name)
@@ -202,10 +198,8 @@ def _assemble(
         settings=settings,
         recordings=recordings,
         robots=RobotStore(settings.data_folder / "robots"),
-        identifications=identifications,
-        diagnoses=diagnoses,
-        rollouts=rollouts,
-        excitations=excitations,
+        items=items,
+        kinds=kinds,
         jobs=jobs,
         runs=runs,
         campaigns=campaigns,
@@ -253,16 +247,6 @@ def open_readers(settings: Settings) -> Executor:
     return WorkerPool(WIDTH, **bounds)
 
 
-def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind, JobKind, JobKind, JobKind]:
-    where = {"server_recordings": settings.recordings_folder}
-    return (
-        JobKind(items["identification"], partial(run_identification, **where)),
-        JobKind(items["diagnosis"], partial(run_diagnosis, **where), is_heavy=True),
-        JobKind(items["excitation"], run_excitation),
-        JobKind(items["rollout"], partial(run_rollout, **where), is_heavy=True),
-    )
-
-
 def _retention(services: Services) -> list[Callable[[], object]]:
     settings, jobs = services.settings, services.jobs
     if settings.prune_older_than_days is None:
@@ -270,10 +254,7 @@ def _retention(services: Services) -> list[Callable[[], object]]:
     kinds = frozenset(settings.prune_kinds or FOLDERS)
     rule = RetentionRule(timedelta(days=settings.prune_older_than_days), kinds, settings.prune_recordings)
     removers: dict[str, Callable[[str], object]] = {
-        "identification": partial(jobs.cancel_or_remove, services.identifications),
-        "diagnosis": partial(jobs.cancel_or_remove, services.diagnoses),
-        "rollout": partial(jobs.cancel_or_remove, services.rollouts),
-        "excitation": partial(jobs.cancel_or_remove, services.excitations),
+        **{name: partial(jobs.cancel_or_remove, kind) for name, kind in services.kinds.items()},
         "run": services.runs.remove,
         "campaign": services.campaigns.remove,
     }
@@ -346,7 +327,7 @@ def require_no_identification(services: Services, version: str) -> None:
     users = set()
     for identifier in services.models.history.list_protected():
         with suppress(NotFoundError):  # of another service
-            workspace = IdentificationWorkspace(services.identifications.items.folder(identifier))
+            workspace = IdentificationWorkspace(services.items["identification"].folder(identifier))
             order = workspace.read_order()
             if order is not None and hash_robot(workspace.robot, order.robot_file) == version:
                 users.add(identifier)

@@ -155,8 +155,9 @@ class JobFiles(Files):
         return Path(output) if output == TRAJECTORY else None
 
 
-def perform_job(workspace: TaskWorkspace[Any], server_recordings: Path) -> JobProblem | None:
+def perform_job(kind: type[TaskWorkspace[Any]], server_recordings: Path, folder: Path) -> JobProblem | None:
     """Do a job as a worker does; returns why there is no result, None where there is one."""
+    workspace = kind(folder)
     folders = (*map(workspace.uploads, (*workspace.roles, SAVED_MODEL)), workspace.robot, server_recordings)
 
     def tell(step: str, percent: float | None = None, figures: Mapping[str, Any] = {}) -> None:

@@ -1,7 +1,7 @@
 """A request that hands a job in: JSON, or a form with the JSON as part `request` and files beside it."""
 
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
@@ -11,12 +11,12 @@ from fastapi import Request
 from pydantic import AfterValidator, Field, FiniteFloat, model_validator
 from pydantic_core import PydanticCustomError
 
-from tauscope.errors import IdentificationError, RobotFileError, ScenarioError
+from tauscope.errors import RobotFileError, ScenarioError
 from tauscope.robot import Robot
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
 from tauscope.runtime.drivers import BackendName, find_driver
-from tauscope.server.http.answers import AnswerModel
+from tauscope.server.http.answers import ROOT, AnswerModel
 from tauscope.server.http.bodies import (
     FORM,
     JSON,
@@ -30,11 +30,11 @@ from tauscope.server.http.bodies import (
     to_json_text,
 )
 from tauscope.server.http.openapi import ROBOT_PARTS, Examples, form_body, json_body, refer_to_model
+from tauscope.server.http.services import Services
 from tauscope.server.http.settings import Settings
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.received_files import INLINE_NAME
-from tauscope.server.queue.task_job import SAVED_MODEL, TaskWorkspace
-from tauscope.server.store.files import FILE_NAME_PATTERN, FILE_NAME_RULE, KeptFile, is_file_name
+from tauscope.server.store.files import FILE_NAME_PATTERN, FILE_NAME_RULE, is_file_name
 from tauscope.server.store.robots import RobotStore, RobotVersion
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.run import BackendChoice
@@ -73,7 +73,7 @@ class RobotVersionAnswer(AnswerModel):
 
     @classmethod
     def of(cls, robot: RobotVersion) -> "RobotVersionAnswer":
-        return cls(**asdict(robot), link=f"/api/v1/robots/versions/{robot.version}")
+        return cls(**asdict(robot), link=f"{ROOT}/robots/versions/{robot.version}")
 
 
 def robot_part_rules(folder: Path) -> dict[str, PartRule]:
@@ -91,25 +91,6 @@ def keep_inline_robot(folder: Path, robot: Mapping[str, Any]) -> str:
 
 
 MODEL_FILE = "model.json"
-
-
-def keep_model(
-    model: str | dict[str, Any] | None,
-    file: KeptFile | None,
-    workspace: TaskWorkspace[Any],
-    read: Callable[[str], bytes],
-) -> str | None:
-    """Put a model, or that of an identifier, into its place; its name. Raises ProblemError, IdentificationError."""
-    if file is not None and model is not None:
-        raise ProblemError("invalid-request", "the model came twice, as part model and in part request; send it once")
-    if file is not None or model is None:
-        return None if file is None else file.name
-    path: Path = workspace.uploads(SAVED_MODEL) / MODEL_FILE
-    if isinstance(model, str):
-        path.write_bytes(read(model))
-        return MODEL_FILE
-    path.write_text(to_json_text(model, "model", IdentificationError), encoding="utf-8")
-    return MODEL_FILE
 
 
 class RobotRequest(StrictModel):
@@ -144,10 +125,6 @@ class RecordingsRequest(RobotRequest):
         return self
 
 
-RECORDINGS_EXAMPLE: tuple[str, Any] = (
-    "Recordings that lie on the server",
-    {"robot": EXAMPLE_ROBOT, "recordings": ["monday.csv", "tuesday.csv"], "held_out": ["wednesday.mcap"]},
-)
 Document = TypeVar("Document", bound=RobotRequest)
 
 
@@ -155,6 +132,22 @@ Document = TypeVar("Document", bound=RobotRequest)
 class Received(Generic[Document]):
     document: Document
     form: ReceivedForm
+
+
+@dataclass(frozen=True)
+class Submission(Received[Document]):
+    """What was handed in; `workspace` is the staged folder that its files lie in, the robot's among them."""
+
+    request: Request
+    services: Services
+    workspace: Any
+    robot_file: str
+    robot: Robot
+
+    @property
+    def robot_fields(self) -> dict[str, Any]:
+        """What every order says of its robot."""
+        return {"robot_file": self.robot_file, "robot_name": self.robot.name}
 
 
 async def receive_request(
