@@ -34,10 +34,7 @@ class StopPolicy(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class DriveLimits:
-    """What the drives themselves enforce, set before torque is switched on; infinite where there is no limit.
-
-    `position_low`, `position_high`: (n,), range of the joint [rad or m].
-    """
+    """What the drives enforce, set before they have torque; infinite: none. `position_low`, `position_high`: (n,)."""
 
     position_low: Array
     position_high: Array
@@ -85,17 +82,11 @@ class Backend(Protocol):
         ...
 
     def connect(self) -> ArmState:
-        """Reach every drive and read it; moves nothing and switches no torque on.
-
-        Raises DriverError ``cannot-connect`` where a device is missing, taken or of the wrong kind.
-        """
+        """Reach and read every drive; moves nothing. Raises DriverError ``cannot-connect``: missing or wrong."""
         ...
 
     def acknowledge_faults(self) -> ArmState:
-        """Clear the faults that the drives have latched, on the operator's word; moves nothing.
-
-        Raises DriverError: ``not-connected``, or ``fault`` where a fault stays.
-        """
+        """Clear latched faults on the operator's word; moves none. Raises DriverError ``not-connected``, ``fault``."""
         ...
 
     def enable(

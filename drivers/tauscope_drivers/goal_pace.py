@@ -38,10 +38,7 @@ class GoalPace:
     def __init__(
         self, servos: Sequence[PacedServo], goals: Sequence[int], caps: Sequence[int], cycle_s: float, now_ns: int
     ) -> None:
-        """Begin with servos that hold their goals.
-
-        `goals`: of each servo [counts]; `caps`: largest speed of each, 0 for none [units].
-        """
+        """Begin with servos that hold `goals` [counts]. `caps`: largest speed of each, 0 for none [units]."""
         self._counts_per_second = [servo.counts_per_speed_unit for servo in servos]
         self._goals = list(goals)
         self._targets = [float(goal) for goal in goals]

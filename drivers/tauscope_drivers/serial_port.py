@@ -37,10 +37,7 @@ class SerialPort:
         self._slack_s = slack_s
 
     def open(self) -> None:
-        """Open the port and lock it against everybody else.
-
-        Raises DriverError ``cannot-connect`` where it is not there, not permitted, or taken; names the holder.
-        """
+        """Open the port and lock it. Raises DriverError ``cannot-connect``: missing, not permitted, or who has it."""
         self.close()
         try:
             self._claim(self.baudrate)
@@ -143,10 +140,7 @@ def expect_latency_s(path: str) -> float:
 
 
 def find_holder(path: str) -> str | None:
-    """The process that has a port open, as ``process 123 (name)``; None where none is seen.
-
-    Processes of other users show their open files only to the superuser.
-    """
+    """Who has a port open, as ``process 123 (name)``; None where none is seen: others' processes show no files."""
     try:
         wanted = os.stat(path).st_rdev
     except OSError:

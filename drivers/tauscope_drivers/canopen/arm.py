@@ -42,10 +42,7 @@ class CanopenArm:
         patience_s: float = PATIENCE_S,
         clock: Clock | None = None,
     ) -> None:
-        """Check the configuration; nothing is opened yet.
-
-        Raises DriverError ``refused`` where the configuration is not usable; names the joint and the key.
-        """
+        """Check the configuration; nothing is opened yet. Raises DriverError ``refused``: names joint and key."""
         self._configuration = read_configuration(joints)
         self._given_bus = bus
         self._patience_s = patience_s
@@ -228,10 +225,7 @@ class CanopenArm:
 
 
 def _require_hold(nodes: Sequence[DriveNode], mode: ControlMode, policy: StopPolicy) -> None:
-    """Refuse torque mode where a drive would fall at a stop that is to hold: it has no targets of position to stay at.
-
-    Raises DriverError ``refused``, which names the joint.
-    """
+    """Refuse torque mode where a drive would fall at a stop that is to hold. Raises DriverError ``refused``."""
     falling = [node for node in nodes if not node.stays_stopped]
     if falling and mode is ControlMode.TORQUE and policy is StopPolicy.HOLD:
         raise DriverError.refusal(

@@ -44,10 +44,7 @@ class CanBus:
     def __init__(
         self, configuration: BusConfiguration, bus: can.BusABC | None = None, clock: Clock | None = None
     ) -> None:
-        """Open the bus.
-
-        Raises DriverError ``cannot-connect`` where the interface is not there, or another program holds it.
-        """
+        """Open the bus. Raises DriverError ``cannot-connect``: there is no interface, or another program has it."""
         self._name = f"{configuration.interface} {configuration.channel}"
         self._clock = clock or MonotonicClock()
         self._network = canopen.Network()
@@ -136,10 +133,7 @@ class CanBus:
                 return
 
     def start_heartbeat(self, period_s: float) -> None:
-        """Be alive to the drives from now on, as long as `receive` or `beat` is called.
-
-        `period_s`: time between heartbeats; 0 ends them [s].
-        """
+        """Be alive to the drives while `receive` or `beat` is called. `period_s`: of heartbeats; 0 ends them [s]."""
         self._heartbeat_period_ns = round(period_s * 1e9)
         self.guarded.clear()
         self._next_heartbeat_ns = self._clock.now_ns()

@@ -28,10 +28,7 @@ _NODE_KEYS = ("node_id", "counts_per_turn", "zero_count", "direction", "rated_to
 
 @dataclass(frozen=True)
 class NodeConfiguration:
-    """One drive.
-
-    `rated_torque_nm`: at the motor shaft, in place of what the drive states (0x6076): makers scale it differently [Nm].
-    """
+    """One drive. `rated_torque_nm`: at the motor shaft, in place of 0x6076, which makers scale differently [Nm]."""
 
     node_id: int
     counts_per_turn: float
@@ -76,10 +73,7 @@ def read_configuration(joints: Sequence[drive_block.DriveJoint]) -> BusConfigura
 
 
 def require_targets(configuration: BusConfiguration, mode: ControlMode) -> None:
-    """Refuse a mode whose targets a drive does not take, by its EDS or DCF file.
-
-    Raises DriverError ``refused``, which names joint, file and object.
-    """
+    """Refuse a mode whose targets a drive's EDS or DCF lacks. Raises DriverError ``refused``: joint and object."""
     for joint, node in enumerate(configuration.nodes, 1):
         if node.device_file is None:
             continue

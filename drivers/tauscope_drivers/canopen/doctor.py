@@ -46,10 +46,7 @@ def can_interfaces() -> list[Finding]:
 
 
 def examine(joints: Sequence[DriveJoint]) -> list[Finding]:
-    """Bus, and every drive that the robot file names.
-
-    Raises DriverError: ``refused``: a ``drive`` block is not valid.
-    """
+    """Bus, and every drive that the robot file names. Raises DriverError ``refused``: a ``drive`` block is invalid."""
     configuration = read_configuration(joints)
     subject = f"{configuration.interface} {configuration.channel}"
     try:

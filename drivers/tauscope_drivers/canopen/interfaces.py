@@ -116,10 +116,7 @@ class SerialAdapterBus(slcanBus):
     _gathered: bytearray | None = None
 
     def __init__(self, path: str, bit_rate: int) -> None:
-        """Open the adapter, and the channel on it.
-
-        Raises CanInitializationError where the port is missing, not permitted or taken; names the holder.
-        """
+        """Open adapter and channel. Raises CanInitializationError: no port, not permitted, or who has it."""
         holder = find_holder(path)
         if holder is not None:
             raise CanInitializationError(f"{holder} has it")
@@ -134,10 +131,7 @@ class SerialAdapterBus(slcanBus):
 
     @contextlib.contextmanager
     def gathering(self) -> Iterator[None]:
-        """Send what is sent within the context with one write, on leaving it; nothing of it where that fails.
-
-        Raises CanOperationError where the port does not take it.
-        """
+        """Send what is sent within the context with one write on leaving it. Raises CanOperationError: not taken."""
         self._gathered = bytearray()
         try:
             yield
@@ -188,10 +182,7 @@ class SerialAdapterBus(slcanBus):
         return line
 
     def _next_line(self) -> str | None:
-        """The first whole line that says something, taken out of the buffer.
-
-        What only acknowledges a command says nothing, and a frame that lacks characters is lost.
-        """
+        """The first whole line that says something: no acknowledgement, no frame that lacks characters."""
         while ends := [place for mark in (self._OK, self._ERROR) if (place := self._buffer.find(mark)) >= 0]:
             end = min(ends) + 1
             line = self._buffer[:end].decode("ascii", "replace")

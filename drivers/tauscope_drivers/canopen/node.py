@@ -300,10 +300,7 @@ class DriveNode:
             self.bus.guarded.add(self.configuration.node_id)
 
     def require_guarding(self) -> None:
-        """Ask it by a remote frame: an adapter that sends none would leave it unguarded, for it counts from the first.
-
-        Raises DriverError ``refused`` where it does not answer.
-        """
+        """Ask it by a remote frame: guarding counts from the first. Raises DriverError ``refused``: no answer."""
         if not self.bus.ask_guard(self.configuration.node_id):
             raise DriverError.refusal(
                 f"{self.place}: answers no remote frame, and would not notice that the host is gone; "

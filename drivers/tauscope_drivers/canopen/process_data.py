@@ -141,10 +141,7 @@ class PdoSlots:
 
 
 def plan_pdos(slots: PdoSlots, target: DriveObject, optional: Iterable[DriveObject]) -> PdoPlan:
-    """PDOs for a target and for all measurements.
-
-    `target`: what the mode is commanded by; `optional`: measurements that the drive has beside the needed ones.
-    """
+    """PDOs for a target and for all measurements. `optional`: measurements that the drive has beside those needed."""
     received, not_received = _assign(RECEIVED, slots.received, (objects.CONTROLWORD, target), ())
     sent, not_sent = _assign(SENT, slots.sent, MEASURED, tuple(optional))
     return PdoPlan(received, sent, (*not_received, *not_sent))
@@ -201,10 +198,7 @@ _SYNC_BYTES = 0
 
 
 def frame_bits(payload_bytes: int) -> int:
-    """Longest form of a standard data frame: 47 + 8 d + ⌊(34 + 8 d − 1)/4⌋ bits for d bytes, interframe space included.
-
-    `payload_bytes`: d, 0 to 8 [bytes].
-    """
+    """Longest standard data frame: 47 + 8 d + ⌊(34 + 8 d − 1)/4⌋ bits, space between frames included; d bytes."""
     return 47 + 8 * payload_bytes + (34 + 8 * payload_bytes - 1) // 4
 
 

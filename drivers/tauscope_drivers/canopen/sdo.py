@@ -76,10 +76,7 @@ class NodeDictionary:
         self.node_id = node_id
 
     def read(self, entry: DriveObject) -> int:
-        """Value of an entry.
-
-        Raises DriverError: ``cannot-connect``: the node does not answer; ``refused``: it has no such entry.
-        """
+        """Value of an entry. Raises DriverError: ``cannot-connect``: no answer; ``refused``: there is no such entry."""
         return int.from_bytes(self.read_data(entry), "little", signed=entry.signed)
 
     def read_surely(self, entry: DriveObject) -> int:
@@ -98,10 +95,7 @@ class NodeDictionary:
         )
 
     def read_data(self, entry: DriveObject) -> bytes:
-        """Value of an entry as transferred, cut to its size; of a text without the zeros that end it.
-
-        Raises DriverError: ``cannot-connect``: the node does not answer; ``refused``: it has no such entry.
-        """
+        """Value of an entry, cut to its size, a text without its zeros. Raises DriverError as `read` does."""
         try:
             data = bytes(_retry_transfer(lambda: self._client.upload(entry.index, entry.subindex)))
         except (SdoError, can.CanError, OSError) as error:
@@ -125,11 +119,7 @@ class NodeDictionary:
             return ""
 
     def write(self, entry: DriveObject, value: int) -> None:
-        """Write an entry and read it back.
-
-        Raises DriverError: ``refused``: the drive keeps another value or forbids the write; ``cannot-connect``: it does
-        not answer.
-        """
+        """Write an entry and read it back. Raises DriverError: ``refused``: not kept; ``cannot-connect``: no answer."""
         kept = None
         for _ in range(_WRITES):
             self.send(entry, value)
@@ -141,17 +131,11 @@ class NodeDictionary:
         )
 
     def send(self, entry: DriveObject, value: int) -> None:
-        """Write an entry that cannot be read back yet.
-
-        Raises DriverError: ``cannot-connect``: the drive does not answer; ``refused``: it forbids the write.
-        """
+        """Write an entry that cannot be read back yet. Raises DriverError: ``cannot-connect`` or ``refused``."""
         self.send_data(entry, value.to_bytes(entry.bits // 8, "little", signed=entry.signed), str(value))
 
     def send_data(self, entry: DriveObject, data: bytes, text: str) -> None:
-        """Write an entry as transferred.
-
-        Raises DriverError: ``cannot-connect``: the drive does not answer; ``refused``: it forbids the write.
-        """
+        """Write an entry as transferred. Raises DriverError: ``cannot-connect``: no answer; ``refused``: forbidden."""
         try:
             _retry_transfer(lambda: self._client.download(entry.index, entry.subindex, data))
         except (SdoError, can.CanError, OSError) as error:

@@ -41,10 +41,7 @@ class HostBrake:
     """Brings joints to rest by targets, with constant deceleration."""
 
     def __init__(self, position: Array, velocity: Array, begin_ns: int) -> None:
-        """Begin at the present motion.
-
-        `position`: (n,) [rad or m]; `velocity`: (n,) [rad/s or m/s]; `begin_ns`: present instant [ns].
-        """
+        """Begin at a motion. `position`: (n,) [rad or m]; `velocity`: (n,) [rad/s or m/s]; `begin_ns`: now [ns]."""
         self._position, self._velocity, self._begin_ns = position, velocity, begin_ns
 
     def targets(self, now_ns: int) -> Array:
@@ -76,10 +73,7 @@ def rate_limited_by(configuration: BusConfiguration) -> str:
 
 @dataclass
 class Session:
-    """An arm's drives, reached.
-
-    `settling_ns`: cycle while drives change state: that of the control loop, once it is known [ns].
-    """
+    """An arm's drives, reached. `settling_ns`: cycle while drives change state; the control loop's once known [ns]."""
 
     bus: CanBus
     nodes: tuple[DriveNode, ...]

@@ -88,10 +88,7 @@ class DriveUnits:
         return round(torque / self.torque_per_permille)
 
     def torque_cap(self, torque: float) -> int:
-        """Largest whole per mille within a torque limit (0x6072).
-
-        `torque`: limit of the joint, infinite where there is none [Nm or N].
-        """
+        """Largest whole per mille within a torque limit (0x6072). `torque`: infinite where there is none [Nm or N]."""
         most = abs(torque / self.torque_per_permille)
         return 0xFFFF if most >= 0xFFFF else math.floor(most)
 

@@ -45,11 +45,7 @@ class DynamixelArm(SerialServoArm[Session]):
         keeps_settings: bool = False,
         clock: Clock | None = None,
     ) -> None:
-        """Nothing is opened yet.
-
-        Raises DriverError: ``refused``: a ``drive`` block is not valid.
-        `keeps_settings`: whether changes of EEPROM stay after the arm is let go.
-        """
+        """Nothing is opened yet. Raises DriverError ``refused``. `keeps_settings`: changes of EEPROM stay."""
         super().__init__(read_configuration(joints), slack_s, clock)
         self._keeps_settings = keeps_settings
         self._bounds = Bounds((), (), (), ())

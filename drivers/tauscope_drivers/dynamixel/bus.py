@@ -146,10 +146,7 @@ class ServoBus(SerialServoBus[Status]):
         return self._ask(servo, packets.encode_read(servo, address, length), length, patience_s)
 
     def read_block(self, servo: int, block: Block) -> dict[str, int]:
-        """Values of a block by their names.
-
-        Raises DriverError: ``cannot-connect``: the servo does not answer; ``refused``: it has no such block.
-        """
+        """Values of a block by name. Raises DriverError: ``cannot-connect``: no answer; ``refused``: no such block."""
         answer = None
         for _ in range(ATTEMPTS):
             answer = self.read_once(servo, block.address, block.length, PATIENCE_S)
@@ -158,17 +155,11 @@ class ServoBus(SerialServoBus[Status]):
         raise _failure(servo, f"{block.items[0].name} cannot be read", answer)
 
     def read(self, servo: int, item: Item) -> int:
-        """Value of an item.
-
-        Raises DriverError: ``cannot-connect``: the servo does not answer; ``refused``: it has no such item.
-        """
+        """Value of an item. Raises DriverError: ``cannot-connect``: no answer; ``refused``: there is no such item."""
         return self.read_block(servo, Block(item.address, item.size, (item,)))[item.name]
 
     def write(self, servo: int, item: Item, value: int) -> None:
-        """Write an item and read it back.
-
-        Raises DriverError: ``cannot-connect``: the servo does not answer; ``refused``: it does not take the value.
-        """
+        """Write an item and read it back. Raises DriverError: ``cannot-connect``: no answer; ``refused``: not taken."""
         answer = None
         for _ in range(ATTEMPTS):
             request = packets.encode_write(servo, item.address, item.encode(value))

@@ -247,10 +247,7 @@ def describe_model(number: int) -> str:
 
 @cache
 def find_model(number: int, firmware: int = 0) -> ServoModel:
-    """The model of a number, with the table of its firmware.
-
-    Raises DriverError ``cannot-connect`` where no table is known for it.
-    """
+    """The model of a number, with the table of its firmware. Raises DriverError ``cannot-connect`` without a table."""
     if number in LEGACY_PRO:
         raise DriverError.no_connection(
             f"a servo is a {describe_model(number)}: its control table is another one; update its firmware to PRO(A) "
@@ -285,10 +282,7 @@ def find_model(number: int, firmware: int = 0) -> ServoModel:
 
 
 def find_model_by_name(name: str) -> ServoModel:
-    """The model of a name, with the table of its oldest firmware.
-
-    Raises DriverError ``refused`` where there is no such model.
-    """
+    """The model of a name, with its oldest firmware's table. Raises DriverError ``refused`` where there is none."""
     wanted = name.lower().replace("-", "_")
     for number, known in model_names().items():
         if wanted == known or wanted.startswith(f"{known}_"):

@@ -28,10 +28,7 @@ _LEAST_FIRMWARE = 45  # of the X series for Fast Sync Read and all bits of Drive
 
 
 def examine(joints: Sequence[DriveJoint], *, slack_s: float = 0.002) -> list[Finding]:
-    """Port, adapter, and every servo that the robot file names.
-
-    Raises DriverError: ``refused``: a ``drive`` block is not valid.
-    """
+    """Port, adapter, and every servo of the robot file. Raises DriverError ``refused``: a ``drive`` block is wrong."""
     return examine_bus(read_configuration(joints), ServoBus, _examine_servos, joints, slack_s)
 
 

@@ -104,10 +104,7 @@ def taking_writes(servo: JointServo, task: ServoTask, *, holds: bool) -> list[Re
 
 
 def watchdog_steps(watchdog_s: float) -> int:
-    """Bus Watchdog for a time, at most that time.
-
-    Raises DriverError ``refused``: shorter or longer than the servos can.
-    """
+    """Bus Watchdog for at most a time. Raises DriverError ``refused``: shorter or longer than the servos can."""
     steps = math.floor(watchdog_s / WATCHDOG_STEP_S + _ROUNDING) if math.isfinite(watchdog_s) else 0
     if not 1 <= steps <= WATCHDOG_MOST:
         raise DriverError.refusal(
@@ -157,10 +154,7 @@ def velocity_cap(servo: JointServo, settings: Mapping[str, int], velocity: float
 def position_counts(
     servo: JointServo, settings: Mapping[str, int], low: float, high: float, mode: ControlMode
 ) -> tuple[int, int]:
-    """Lowest and highest Goal Position within the joint's limits, and the servo's own where it applies them.
-
-    `low`, `high`: limits of the joint, infinite where there are none [rad or m].
-    """
+    """Lowest and highest Goal Position in limits, infinite where none [rad or m], and the servo's where it has them."""
     lowest, highest = servo.units.counts_within(low, high)
     if mode is ControlMode.POSITION and servo.model.family.position_mode not in _MULTI_TURN_MODES:
         return max(lowest, settings["Min Position Limit"]), min(highest, settings["Max Position Limit"])

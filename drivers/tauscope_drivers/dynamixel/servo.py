@@ -54,10 +54,7 @@ class ServoUnits:
         return round(position / self.radians_per_count) + self.zero_count
 
     def counts_within(self, low: float, high: float) -> tuple[int, int]:
-        """Lowest and highest whole count between two joint positions.
-
-        `low`, `high`: infinite where there is no limit [rad or m].
-        """
+        """Lowest and highest whole count between two positions, infinite where there is no limit [rad or m]."""
         ends = sorted((low / self.radians_per_count, high / self.radians_per_count))
         lowest = -MULTI_TURN_COUNTS if ends[0] == -math.inf else math.ceil(ends[0] - _ROUNDING) + self.zero_count
         highest = MULTI_TURN_COUNTS if ends[1] == math.inf else math.floor(ends[1] + _ROUNDING) + self.zero_count
@@ -68,10 +65,7 @@ class ServoUnits:
         return units * self.velocity_unit
 
     def velocity_cap(self, velocity: float) -> int:
-        """Profile Velocity for a largest speed; 0, which means none, where there is none.
-
-        `velocity`: positive, may be infinite [rad/s or m/s].
-        """
+        """Profile Velocity for a largest speed, which may be infinite [rad/s or m/s]; 0 means that there is none."""
         most = velocity / abs(self.velocity_unit)
         return 0 if most > _LARGEST_PROFILE else max(1, math.floor(most))
 
@@ -84,10 +78,7 @@ class ServoUnits:
         return round(torque / self._torque_per_unit())
 
     def current_cap(self, torque: float) -> int:
-        """Largest whole Goal Current within a torque limit; 0x7FFF where there is no limit.
-
-        `torque`: positive, may be infinite [Nm or N].
-        """
+        """Largest whole Goal Current within a torque limit [Nm or N]; 0x7FFF where that is infinite."""
         if torque == math.inf:
             return 0x7FFF
         return min(0x7FFF, math.floor(torque / abs(self._torque_per_unit()) + _ROUNDING))

@@ -98,10 +98,7 @@ class Session:
 
 
 def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) -> Session:
-    """Reach every servo, set what moves nothing, and read its health.
-
-    Raises DriverError ``cannot-connect`` where a servo is missing or of the wrong kind.
-    """
+    """Reach every servo, set what moves nothing, read its health. Raises DriverError ``cannot-connect``."""
     bus.return_delay_s = FACTORY_RETURN_DELAY_S
     servos = tuple(_reach(bus, number, servo) for number, servo in enumerate(configurations, 1))
     session = make_session(bus, servos, [read_settings(bus, servo) for servo in servos])
@@ -127,10 +124,7 @@ def make_session(bus: ServoBus, servos: Sequence[JointServo], settings: Sequence
 
 
 def read_settings(bus: ServoBus, servo: JointServo) -> dict[str, int]:
-    """Settings of a servo whose counts and speeds are those of its model's table.
-
-    Raises DriverError ``cannot-connect`` where it does not answer, or its gear is another one.
-    """
+    """Settings of a servo with its table's counts and speeds. Raises DriverError ``cannot-connect``: another gear."""
     settings, gear = read_items(bus, servo, SETTINGS), read_items(bus, servo, ELECTRONIC_GEAR)
     numerator, denominator = (gear.get(name, 1) for name in ELECTRONIC_GEAR)
     ratio = gear_ratio_of(servo.model.name)

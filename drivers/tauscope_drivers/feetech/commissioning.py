@@ -119,10 +119,7 @@ def rehearse(servo: JointServo, reading: Reading, limits: DriveLimits) -> list[F
 
 
 def find_doubts(servo: JointServo, reading: Reading, limits: DriveLimits, targets: Mapping[str, int]) -> list[Finding]:
-    """What a run can do with, said by doctor; the limits are those of this joint alone.
-
-    `targets`: the registers of `TARGETS`.
-    """
+    """What a run can do with, said by doctor. `limits`: of this joint alone; `targets`: the registers of `TARGETS`."""
     settings = reading.settings
     gains = ", ".join(f"{name} {settings[f'{name} Coefficient']}" for name in "PDI")
     volts = reading.feedback["Present Voltage"] * registers.VOLT

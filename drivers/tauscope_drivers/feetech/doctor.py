@@ -19,10 +19,7 @@ USUAL_BAUDS = (1_000_000, 500_000, 250_000, 128_000, 115_200, 57_600, 38_400)
 
 
 def examine(joints: Sequence[DriveJoint], *, slack_s: float = 0.002) -> list[Finding]:
-    """Port, adapter, and every servo that the robot file names.
-
-    Raises DriverError: ``refused``: a ``drive`` block is not valid.
-    """
+    """Port, adapter, and every servo of the robot file. Raises DriverError ``refused``: a ``drive`` block is wrong."""
     return examine_bus(read_configuration(joints), FeetechBus, _examine_servos, joints, slack_s)
 
 

@@ -67,10 +67,7 @@ class SerialServoArm(ABC, Generic[_Session]):
         return self._observe(self._session, is_health_fresh=True)
 
     def acknowledge_faults(self) -> ArmState:
-        """Forget faults whose cause is gone; an arm that is still enabled is stopped by its policy first.
-
-        Raises DriverError: ``not-connected``, or ``fault`` where a fault stays.
-        """
+        """Forget faults whose cause is gone; stops the arm. Raises DriverError ``not-connected`` or ``fault``."""
         session = self._require_session()
         with self._watching_the_port():
             if self._mode is not None:
@@ -105,10 +102,7 @@ class SerialServoArm(ABC, Generic[_Session]):
         return self._observe(session, is_health_fresh=True)
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
-        """One cycle: goals out, the state of all servos in, and a piece of one servo's health.
-
-        Raises DriverError: ``not-enabled``, ``refused`` (nothing is sent), or ``lost``.
-        """
+        """One cycle. Raises DriverError: ``not-enabled``, ``refused`` (nothing is sent), or ``lost``."""
         session = self._require_session()
         if self._mode is None:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the arm is not enabled; enable it first")
@@ -211,10 +205,7 @@ class SerialServoArm(ABC, Generic[_Session]):
 
 
 def act_on_each(joints: Iterable[int], act: Callable[[int], None], let_go: Callable[[int], None] | None = None) -> None:
-    """Do something to every servo, also after one that failed; the first failure is raised at the end.
-
-    `let_go`: what is done to one that failed.
-    """
+    """Act on every servo, also after one that failed, which is `let_go`; the first failure is raised at the end."""
     failure: DriverError | None = None
     for joint in joints:
         try:

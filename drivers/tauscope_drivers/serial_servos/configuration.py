@@ -43,10 +43,7 @@ def read_bus(
 
 
 def read_torque_constant(joint: DriveJoint) -> float | None:
-    """Joint torque for one unit that the servo measures; None where the robot file does not say [Nm or N].
-
-    Raises DriverError ``refused`` where it is zero or no number.
-    """
+    """Joint torque for one unit that is measured, None where not said [Nm or N]. Raises DriverError ``refused``."""
     constant = joint.torque_per_unit
     if constant is not None and (not math.isfinite(constant) or constant == 0.0):
         raise DriverError.refusal(f"joint {joint.name}: torque_constant = {constant}; give one that is not zero")

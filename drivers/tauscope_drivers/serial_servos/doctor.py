@@ -47,10 +47,7 @@ def examine_bus(
 def measure_loop_rate(
     bus: SerialServoBus[Any], ask: Callable[[], Answers[Any]], traffic: CycleTraffic, return_delay_s: float
 ) -> Finding:
-    """How often all servos can be read, measured, beside what a whole cycle allows.
-
-    `ask`: reads all servos once; `return_delay_s`: of a run [s].
-    """
+    """How often all servos can be read, beside what a cycle allows. `ask`: reads all once; `return_delay_s`: [s]."""
     begin_ns = time.monotonic_ns()
     missed = sum(traffic.servos - len(ask().statuses) for _ in range(MEASURED_CYCLES))
     rate_hz = MEASURED_CYCLES / ((time.monotonic_ns() - begin_ns) * 1e-9)
