@@ -60,10 +60,7 @@ def _require(slope: float | None, level: float, place: str) -> float:
 
 
 def smooth_sign(velocity: float, k_v: float) -> float:
-    """A(v) = (2/π) arctan(K_v v), the continuous stand-in for sgn v, equation (8).
-
-    `velocity`: v [rad/s or m/s]; `k_v`: K_v [s/rad or s/m].
-    """
+    """A(v) = (2/π) arctan(K_v v), a continuous sgn v, equation (8). v [rad/s or m/s]; K_v [s/rad or s/m]."""
     return math.atan(k_v * velocity) / (0.5 * math.pi)
 
 

@@ -13,10 +13,7 @@ LEAST_HARMONICS = 2  # one harmonic alone cannot be at rest, with zero accelerat
 
 @dataclass(frozen=True, eq=False)
 class MotionSamples:
-    """A motion at given instants.
-
-    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈ [rad or m, and per s, per s²].
-    """
+    """A motion at given instants: q, q̇, q̈, each (N, n) [rad or m, and per s, per s²]."""
 
     position: Array
     velocity: Array

@@ -47,11 +47,7 @@ class ScenarioDocument(Document):
 
 
 def read_scenario(path: Path | str, robot: Robot) -> Scenario:
-    """The scenario of a file.
-
-    Raises ScenarioError if the file cannot be read, is not valid or does not fit the robot; one line naming file, entry
-    and key.
-    """
+    """The scenario of a file. Raises ScenarioError, one line that names file, entry and key, if it is not valid."""
     try:
         data = read_bounded(Path(path), LARGEST_SCENARIO_FILE)
     except RobotFileError as error:

@@ -118,11 +118,7 @@ class SimulatedDevice:
         return ArmState(self._sample_ns, position, velocity, effort, temperature, enabled, self._latch.faults)
 
     def enable(self, mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> None:
-        """Take the arm under power where it stands.
-
-        Raises DriverError: ``refused`` or ``fault``.
-        `watchdog_s`: time without setpoints after which it does [s].
-        """
+        """Take the arm under power where it stands, for `watchdog_s` [s]. Raises DriverError ``refused``, ``fault``."""
         if self._activity in COMMANDED:
             raise DriverError.refusal("the arm is enabled already; stop it before enabling it again")
         self._refuse_faults()

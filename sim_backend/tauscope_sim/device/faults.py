@@ -58,10 +58,7 @@ class Injection:
 
 
 def device_fault(code: FaultCode, joint: int | None, detail: str) -> Fault:
-    """The fault as the protocol of `drivers` states it.
-
-    `joint`: joint number, counted from 1; None for the whole arm.
-    """
+    """The fault as the protocol of `drivers` states it. `joint`: counted from 1; None for the whole arm."""
     return Fault(code.value, joint, detail, REMEDIES[code])
 
 

@@ -18,10 +18,7 @@ REACH = 1.0  # postures are looked for within so much of zero [rad or m]
 
 
 def resting_posture(robot: Robot) -> Array:
-    """Zero, or the end of each joint's range nearest to it; elsewhere where a joint has next to no inertia there.
-
-    Returns (n,), position [rad or m].
-    """
+    """Zero, or the end of each range nearest to it, (n,) [rad or m]; elsewhere where a joint has next to no inertia."""
     ranges = np.array([joint.limits.position or (-np.inf, np.inf) for joint in robot.joints])
     nearest = np.clip(0.0, ranges[:, 0], ranges[:, 1])
     # the same arm stands at the same place every time

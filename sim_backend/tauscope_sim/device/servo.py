@@ -109,10 +109,7 @@ class Servo:
         self._age = _TICKS_PER_STIFFNESS
 
     def absorb(self, feed_forward: Array) -> None:
-        """Keep a feed-forward torque that is about to end, so that nothing jerks.
-
-        `feed_forward`: (n,), torque of the host [Nm or N].
-        """
+        """Keep a feed-forward torque that is about to end, so that nothing jerks. `feed_forward`: (n,) [Nm or N]."""
         self._integral = self.capped(self._integral + feed_forward)
 
     def track(self, error: Array, error_rate: Array, feed_forward: Array | None, position: Array) -> Array:
@@ -138,10 +135,7 @@ class Servo:
         return torque
 
     def damp(self, position: Array, velocity: Array) -> Array:
-        """Torque against motion, (n,) [Nm or N].
-
-        `position`: (n,), q, for H(q) [rad or m]; `velocity`: (n,), q̇ [rad/s or m/s].
-        """
+        """Torque against motion, (n,) [Nm or N]. `position`: q, for H(q) [rad or m]; `velocity`: q̇ [rad/s or m/s]."""
         damping, _, _ = self._renew(position)
         return self.capped(-DAMPING * damping.dot(velocity))
 

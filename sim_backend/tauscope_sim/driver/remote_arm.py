@@ -162,11 +162,7 @@ class RemoteSimulatedArm:
         return self._clock
 
     def connect(self) -> ArmState:
-        """Reach the device and read it.
-
-        Raises DriverError: ``cannot-connect`` where there is no device, another host has it, or it has another number
-        of joints.
-        """
+        """Reach the device and read it. Raises DriverError ``cannot-connect``: missing, taken, or of other joints."""
         if self._socket is not None:
             raise DriverError.no_connection("the arm is connected already; disconnect it first")
         connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -204,10 +200,7 @@ class RemoteSimulatedArm:
         watchdog_s: float,
         cycle_s: float | None = None,
     ) -> ArmState:
-        """Take the arm under power where it stands; see `drivers.Backend`.
-
-        `watchdog_s`: time without `exchange` after which it does [s].
-        """
+        """Take the arm under power where it stands; see `drivers.Backend`. `watchdog_s`: without `exchange` [s]."""
         del cycle_s
         asked = messages.encode_enable(mode, limits, stop_policy, watchdog_s)
         return self._state_after(messages.FrameKind.ENABLE, asked)
@@ -223,10 +216,7 @@ class RemoteSimulatedArm:
         return self._state_of(reply)
 
     def stop(self, policy: StopPolicy) -> ArmState:
-        """Stop the arm; where there is no connection the device has done so by itself, and nothing is known of it.
-
-        Raises DriverError: ``lost`` where the device does not confirm.
-        """
+        """Stop the arm, which has done so itself where there is no connection. Raises DriverError ``lost``."""
         if self._socket is None:
             return self._miss()
         return self._state_after(messages.FrameKind.STOP, messages.encode_document(policy))

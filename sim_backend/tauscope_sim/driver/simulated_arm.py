@@ -12,11 +12,7 @@ from tauscope_sim.scenario import Scenario
 
 
 class VirtualClock:
-    """The clock of a simulated device; waiting carries the device forward.
-
-    `start_ns`: its first instant [ns].
-    `advance`: lets the device live up to an instant [ns].
-    """
+    """The clock of a simulated device. `start_ns`: first instant; `advance`: lets the device live up to one [ns]."""
 
     def __init__(self, start_ns: int, advance: Callable[[int], None]) -> None:
         self._now_ns = start_ns
@@ -85,10 +81,7 @@ class SimulatedArm:
         watchdog_s: float,
         cycle_s: float | None = None,
     ) -> ArmState:
-        """Take the arm under power where it stands; see `drivers.Backend`.
-
-        `watchdog_s`: time without `exchange` after which it does, in virtual time [s].
-        """
+        """Take the arm under power; see `drivers.Backend`. `watchdog_s`: without `exchange`, in virtual time [s]."""
         del cycle_s
         self._require_connection()
         self.device.enable(mode, limits, stop_policy, watchdog_s)

@@ -59,10 +59,7 @@ class ServoLoop:
         self._held = None
 
     def demand(self, position: float, duration_s: float) -> Demand:
-        """What the servo wants now.
-
-        `position`: of the joint, as the encoder sees it [rad or m]; `duration_s`: since the last demand [s].
-        """
+        """What the servo wants now. `position`: as the encoder sees it [rad or m]; `duration_s`: since the last [s]."""
         memory, unit = self._memory, abs(self._specification.torque_per_unit)
         limit = memory.get("Current Limit")
         if memory.get("Operating Mode") in (POSITION_MODE, EXTENDED_MODE, CURRENT_BASED_MODE):
@@ -179,10 +176,7 @@ class EmulatedServo:
         self._heard_s = now_s
 
     def write(self, address: int, data: bytes) -> None:
-        """Write to the control table and do what that means.
-
-        Raises WriteRefusedError where the servo does not take it.
-        """
+        """Write to the control table and do what that means. Raises WriteRefusedError where it is not taken."""
         memory, had_torque, was_latched = self.memory, self.has_torque, self.memory.is_latched
         written = memory.write(address, data)
         goal_wakes = memory.get("Drive Mode") & _TORQUE_ON_BY_GOAL and any(name in GOALS for name in written)
@@ -212,10 +206,7 @@ class EmulatedServo:
         self.write(*registered)
 
     def clear(self, what: bytes) -> None:
-        """Carry out the instruction Clear: an error of the Y series, where its cause is gone.
-
-        Raises WriteRefusedError where the error stays, or this servo knows no such thing.
-        """
+        """Carry out Clear: an error of the Y series whose cause is gone. Raises WriteRefusedError where it stays."""
         code = self.memory.get("Error Code")
         is_hot = self.memory.get("Present Motor Temperature") > self.memory.get("Motor Temperature Limit")
         if "Error Code" not in self.memory or what != _ERROR_TO_CLEAR or code in _Y_LASTING or (code == 4 and is_hot):
@@ -244,10 +235,7 @@ class EmulatedServo:
             self._loop.release()
 
     def demand(self, position: float, now_s: float, duration_s: float) -> Demand:
-        """What the servo wants of its joint for the next stretch of time.
-
-        `position`: of the joint [rad or m]; `duration_s`: since the last call [s].
-        """
+        """What the servo wants for the next stretch. `position`: [rad or m]; `duration_s`: since the last call [s]."""
         if not self.has_torque:
             self._heard_s = now_s
             return RELEASED
@@ -258,10 +246,7 @@ class EmulatedServo:
         return replace(demand, position=demand.position - jump) if jump else demand
 
     def take_motion(self, position: float, velocity: float, torque: float) -> None:
-        """See the joint, and the torque that the servo exerts on it.
-
-        `position`: [rad or m]; `velocity`: [rad/s or m/s]; `torque`: [Nm or N].
-        """
+        """See the joint, and the servo's torque on it. [rad or m], [rad/s or m/s], [Nm or N]."""
         # Torque is that of the period that ends here; position and velocity are taken at its middle too.
         before, speed_before = self._motion or (position, velocity)
         current = torque / self.specification.torque_per_unit

@@ -24,10 +24,7 @@ ALL_STEPS = ceil(LONGEST_CATCH_UP_S / STEP_S)  # as many as can be due
 
 
 class DeviceClock:
-    """How far devices have come; what a machine that stood still made them miss is lost, and told.
-
-    `lost_s`: time that was never stepped through [s].
-    """
+    """How far devices have come. `lost_s`: never stepped through, for the machine stood still; it is told [s]."""
 
     def __init__(self, now_s: float) -> None:
         self.tick = round(now_s / STEP_S)
@@ -165,10 +162,7 @@ _TERMIOS2 = "=4I20B2I"
 
 
 class PseudoTerminal:
-    """The near end, a `Port`; a master opens the far end by the name that was linked to it.
-
-    The far end is not kept open here, so that whoever has it open is a master.
-    """
+    """The near end, a `Port`; a master opens the far end, which is not kept open here, by the name linked to it."""
 
     def __init__(self, link: str) -> None:
         self._near, far = os.openpty()

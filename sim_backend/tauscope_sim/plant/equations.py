@@ -72,10 +72,7 @@ class Compliance:
                 matrix[motor, joint] -= felt * slope
 
     def twist_at_rest(self, load: list[float]) -> list[float]:
-        """Twist of each compliant joint at rest [rad or m].
-
-        `load`: torque that the links need, one a joint [Nm or N].
-        """
+        """Twist of each compliant joint at rest [rad or m]. `load`: torque that the links need [Nm or N]."""
         return [part.twist_at_rest(load[joint]) for joint, _, part in self._parts]
 
 
@@ -99,10 +96,7 @@ class _Law(NamedTuple):
 
 
 class StaticFriction(Term):
-    """Friction τ_f = τ_s (2/π) arctan(K_v v) + τ_sc (2/π) arctan(δ v) + τ_v v of every joint, v the motor's velocity.
-
-    Raises RobotFileError where a shape constant that is needed is missing.
-    """
+    """τ_f = τ_s (2/π) arctan(K_v v) + τ_sc (2/π) arctan(δ v) + τ_v v; RobotFileError without a shape constant."""
 
     def __init__(
         self,
@@ -188,10 +182,7 @@ class EquationsOfMotion:
         return temperature
 
     def evaluate(self, time: float, vector: list[float], drive: list[float]) -> list[float]:
-        """Rate of change of y = [p, v, z], 2N + m numbers.
-
-        `time`: t [s]; `drive`: u, torque of the drives on the joint's side, one a joint [Nm or N].
-        """
+        """Rate of change of y = [p, v, z], 2N + m. `time`: t [s]; `drive`: u, the drives' joint torque [Nm or N]."""
         size = self._size
         link_side = self.load_at(time, vector)
         forces, moment = self._forces, self._moment
@@ -225,10 +216,7 @@ class EquationsOfMotion:
         return self._matrix, slopes
 
     def load_at(self, time: float, vector: list[float]) -> list[float]:
-        """Move the links, sum the terms' torque into `Forces`, and return h + c + link, one a joint [Nm or N].
-
-        That is what links need from their transmissions when they do not accelerate. `time`: t [s].
-        """
+        """Move the links at t [s], sum the terms into `Forces`; h + c + link, one a joint [Nm or N]."""
         count, size = self._count, self._size
         moment, forces = self._moment, self._forces
         self.bodies.update(vector[:count], vector[size : size + count])
