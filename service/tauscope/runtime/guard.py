@@ -60,10 +60,7 @@ _ROOM = 1.05
 
 @dataclass(frozen=True, eq=False)
 class GuardLimits:
-    """Limits of every joint; infinite where there is none.
-
-    `position_low`, `position_high`: (n,), range of the targets [rad or m].
-    """
+    """Limits of every joint; infinite where there is none. `position_low`, `position_high`: (n,) [rad or m]."""
 
     joints: tuple[str, ...]
     units: tuple[str, ...]

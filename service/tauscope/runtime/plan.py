@@ -64,11 +64,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Targets of every cycle, from where the arm stands to the end of the motion.
-
-    `period_ns`: time between cycles [ns].
-    `position`, `velocity`: (N, n), targets [rad or m, and per s].
-    """
+    """Targets of every cycle, the ramp's first: (N, n) [rad or m, and per s]. `period_ns`: of a cycle [ns]."""
 
     rate_hz: float  # cycles a second [Hz]
     period_ns: int
