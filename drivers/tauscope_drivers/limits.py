@@ -32,7 +32,7 @@ def stated_limits(joints: Sequence[DriveJoint]) -> DriveLimits:
 
 
 def require_sensible(limits: DriveLimits, position: Array, labels: Sequence[str]) -> None:
-    """Refuse limits that leave no motion, or none from `position` [rad or m]. Raises DriverError ``refused``."""
+    """Refuse limits that leave no motion from `position`, (n,) [rad or m]. Raises DriverError ``refused``."""
     joint_count = len(position)
     for name in ("position_low", "position_high", "velocity", "torque"):
         if np.shape(getattr(limits, name)) != (joint_count,):
@@ -67,7 +67,7 @@ class RunawayWatch:
         self._fast = np.zeros(len(limits.velocity), dtype=np.int64)
 
     def look(self, position: Array, velocity: Array) -> Fault | None:
-        """The first joint that leaves its limits; NaN leaves none. (n,) [rad or m], [rad/s or m/s]."""
+        """The first joint that leaves its limits; not NaN. `position`, `velocity`: (n,) [rad or m, and per s]."""
         limits = self._limits
         with np.errstate(invalid="ignore"):
             ahead = position + CATCH_S * velocity

@@ -70,7 +70,7 @@ class SetpointSpline:
         return time - self._grid > _LATEST_PHASE * self._period
 
     def restart(self, position: Array) -> None:
-        """Go on with setpoints from another place, (n,) [rad or m]; the pace of the host is not forgotten."""
+        """Go on with setpoints from `position`, (n,) [rad or m]; the pace of the host is not forgotten."""
         self._points[:] = position
 
     def at(self, time: float) -> tuple[Array, Array]:
@@ -207,7 +207,7 @@ class Target:
         self._behind = False
 
     def limit(self, low: Array, high: Array, fastest: Array) -> None:
-        """Keep the target within limits from now on, (n,), from outside also where it is [rad or m, and per s]."""
+        """Keep the target within `low`, `high` and `fastest`, (n,), or where it is [rad or m, and per s]."""
         self._low, self._high = np.minimum(low, self.position), np.maximum(high, self.position)
         self._fastest = fastest
 

@@ -15,7 +15,7 @@ class Channel(Protocol):
     """A sensor effect at work: it sees the samples in the order of time, and only those of the past."""
 
     def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        """Position and torque (n,) recorded at `time` [s] in place of a sample's [rad or m; Nm or N]."""
+        """What is recorded at `time` [s] in place of `position` [rad or m] and `torque` [Nm or N], (n,)."""
         ...
 
 
