@@ -15,13 +15,7 @@ from tauscope_drivers.dynamixel.original_settings import CHANGED, OriginalSettin
 from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, SETTINGS, RegisterWrite, commissioning_writes
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.errors import DriverError
-from tauscope_drivers.serial_servos.bus import (
-    FACTORY_RETURN_DELAY_S,
-    PATIENCE_S,
-    RETURN_DELAY_UNIT_S,
-    SHORTEST_RETURN_DELAY_S,
-    learn_latency,
-)
+from tauscope_drivers.serial_servos import bus as serial_bus
 
 ELECTRONIC_GEAR = ("Electronic GearRatio Numerator", "Electronic GearRatio Denominator")
 
@@ -99,7 +93,7 @@ class Session:
 
 def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) -> Session:
     """Reach every servo, set what moves nothing, read its health. Raises DriverError ``cannot-connect``."""
-    bus.return_delay_s = FACTORY_RETURN_DELAY_S
+    bus.return_delay_s = serial_bus.FACTORY_RETURN_DELAY_S
     servos = tuple(_reach(bus, number, servo) for number, servo in enumerate(configurations, 1))
     session = make_session(bus, servos, [read_settings(bus, servo) for servo in servos])
     settings = session.settings
@@ -109,9 +103,9 @@ def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) ->
     for joint, servo in enumerate(servos):
         holds = bool(session.health.has_torque[joint])
         session.carry_out(joint, commissioning_writes(servo, settings[joint], holds=holds))
-    slowest = max(values["Return Delay Time"] for values in settings) * RETURN_DELAY_UNIT_S
-    bus.return_delay_s = max(SHORTEST_RETURN_DELAY_S, slowest)
-    learn_latency(bus.port, session.group.probe())
+    slowest = max(values["Return Delay Time"] for values in settings) * serial_bus.RETURN_DELAY_UNIT_S
+    bus.return_delay_s = max(serial_bus.SHORTEST_RETURN_DELAY_S, slowest)
+    serial_bus.learn_latency(bus.port, session.group.probe())
     return session
 
 
@@ -158,6 +152,6 @@ def _reach(bus: ServoBus, number: int, configuration: ServoConfiguration) -> Joi
         )
     servo = make_servo(number, configuration, identity)
     level = servo.model.items["Status Return Level"]
-    if bus.read_once(servo.servo, level.address, level.size, PATIENCE_S) is None:  # it answers pings alone
+    if bus.read_once(servo.servo, level.address, level.size, serial_bus.PATIENCE_S) is None:  # it answers pings alone
         bus.sync_write([level], {servo.servo: [ANSWERS_ALL]})
     return servo

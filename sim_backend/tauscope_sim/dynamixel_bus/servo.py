@@ -11,13 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from tauscope_sim.dynamixel_bus.control_memory import (
-    GOALS,
-    RESULT_FAIL,
-    ControlMemory,
-    ServoSpecification,
-    WriteRefusedError,
-)
+from tauscope_sim.dynamixel_bus import control_memory
 from tauscope_sim.emulation.fault_kit import FaultKind
 
 CURRENT_MODE, POSITION_MODE, EXTENDED_MODE, CURRENT_BASED_MODE = 0, 3, 4, 5
@@ -40,7 +34,7 @@ RELEASED = Demand(tracks=False)  # no torque
 class ServoLoop:
     """Goals to demands: a target that moves no faster than Profile Velocity, or plain current."""
 
-    def __init__(self, specification: ServoSpecification, memory: ControlMemory) -> None:
+    def __init__(self, specification: control_memory.ServoSpecification, memory: control_memory.ControlMemory) -> None:
         self._specification = specification
         self._memory = memory
         self._target: float | None = None
@@ -123,9 +117,9 @@ class EmulatedServo:
         FaultKind.ENCODER_JUMP: ENCODER,
     }
 
-    def __init__(self, specification: ServoSpecification, *, seed: int = 0) -> None:
+    def __init__(self, specification: control_memory.ServoSpecification, *, seed: int = 0) -> None:
         self.specification = specification
-        self.memory = ControlMemory(specification)
+        self.memory = control_memory.ControlMemory(specification)
         self.encoder_offset_counts = 0
         self._loop = ServoLoop(specification, self.memory)
         self._random = random.Random(seed)  # noqa: S311 (noise, not a secret)
@@ -179,13 +173,15 @@ class EmulatedServo:
         """Write to the control table and do what that means. Raises WriteRefusedError where it is not taken."""
         memory, had_torque, was_latched = self.memory, self.has_torque, self.memory.is_latched
         written = memory.write(address, data)
-        goal_wakes = memory.get("Drive Mode") & _TORQUE_ON_BY_GOAL and any(name in GOALS for name in written)
+        goal_wakes = memory.get("Drive Mode") & _TORQUE_ON_BY_GOAL and any(
+            name in control_memory.GOALS for name in written
+        )
         if goal_wakes and not had_torque:
             memory.put("Torque Enable", 1)
         if self.has_torque and not had_torque:
             if self._is_shut_down:
                 memory.put("Torque Enable", 0)
-                raise WriteRefusedError(RESULT_FAIL)
+                raise control_memory.WriteRefusedError(control_memory.RESULT_FAIL)
             self._loop.release()
         if was_latched and not memory.is_latched:
             self._loop.resume()
@@ -200,7 +196,7 @@ class EmulatedServo:
     def act(self) -> None:
         """Carry out the write that was kept. Raises WriteRefusedError where none was kept, or it is refused."""
         if self._registered is None:
-            raise WriteRefusedError(2)
+            raise control_memory.WriteRefusedError(2)
         registered, self._registered = self._registered, None
         self.memory.put("Registered Instruction", 0)
         self.write(*registered)
@@ -210,7 +206,7 @@ class EmulatedServo:
         code = self.memory.get("Error Code")
         is_hot = self.memory.get("Present Motor Temperature") > self.memory.get("Motor Temperature Limit")
         if "Error Code" not in self.memory or what != _ERROR_TO_CLEAR or code in _Y_LASTING or (code == 4 and is_hot):
-            raise WriteRefusedError(RESULT_FAIL)
+            raise control_memory.WriteRefusedError(control_memory.RESULT_FAIL)
         if code == _Y_WATCHDOG_CODE:
             self.memory.put("Bus Watchdog", 0)
             self._loop.resume()
