@@ -26,12 +26,7 @@ from tauscope.server.control.run import (
     wait_for_end,
 )
 from tauscope.server.control.run_manager import Manager, RunManager, run_recording_name
-from tauscope.server.queue.analyses import (
-    DiagnosisWorkspace,
-    ExcitationOrder,
-    ExcitationWorkspace,
-    IdentificationWorkspace,
-)
+from tauscope.server.queue import analyses
 from tauscope.server.queue.job_folder import (
     JobProblem,
     JobRecord,
@@ -182,14 +177,14 @@ class CampaignRunner:
             self._record(recordings=recordings, held_out=judges)
         self._release_arm()
         self._begin("identify")
-        self._analyse("identification", IdentificationWorkspace, order.identification)
+        self._analyse("identification", analyses.IdentificationWorkspace, order.identification)
         if order.diagnosis is not None:
             self._begin("diagnose")
-            self._analyse("diagnosis", DiagnosisWorkspace, order.diagnosis)
+            self._analyse("diagnosis", analyses.DiagnosisWorkspace, order.diagnosis)
 
     def _design(self, options: ExcitationDesignOptions, link: str) -> str:
-        order = ExcitationOrder(**self._robot, options=options)
-        identifier = self._submit(ExcitationWorkspace, order)
+        order = analyses.ExcitationOrder(**self._robot, options=options)
+        identifier = self._submit(analyses.ExcitationWorkspace, order)
         self._record(**{link: identifier})
         return identifier
 
@@ -223,7 +218,7 @@ class CampaignRunner:
         )
         with stage_workspace(dependencies.runs.items, RunWorkspace) as staged:
             self._put_robot(staged.robot)
-            design = ExcitationWorkspace(dependencies.kinds["excitation"].items.folder(excitation))
+            design = analyses.ExcitationWorkspace(dependencies.kinds["excitation"].items.folder(excitation))
             take_trajectory(design, staged)
             staged.write_order(request)
             self._run_identifier = dependencies.runs.submit(staged.folder, ready_motion, self.holder, self._permit)

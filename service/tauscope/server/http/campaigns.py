@@ -12,50 +12,36 @@ from tauscope.diagnosis import DiagnosisDocument
 from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
 from tauscope.server.control.campaign import CampaignLinks, CampaignOrder, CampaignWorkspace
+from tauscope.server.http import answers
 from tauscope.server.http.analyses import DIAGNOSES, IDENTIFICATIONS
-from tauscope.server.http.answers import (
-    ENDINGS,
-    ROOT,
-    AnswerModel,
-    Identifier,
-    JobAnswer,
-    MotionLinks,
-    describe_damaged,
-    describe_job,
-    require_document,
-    require_success,
-)
 from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.leases import permit_of
 from tauscope.server.http.runs import RUNS
 from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.tasks import submission
 from tauscope.server.http.tasks.queued import QueuedTask
 from tauscope.server.http.tasks.router import MovingResource, Resource
-from tauscope.server.http.tasks.submission import (
-    EXAMPLE_ROBOT,
-    BackendRequest,
-    RobotRequest,
-    Submission,
-    choose_backend,
-)
 from tauscope.server.problems import problem_responses
 from tauscope.server.queue.job_folder import JobState
 from tauscope.tasks.campaign import CampaignOptions
 from tauscope.tasks.run import BackendChoice
 
 
-class CampaignRequest(RobotRequest, CampaignOptions):
+class CampaignRequest(submission.RobotRequest, CampaignOptions):
     """Which campaign is wanted."""
 
-    backend: BackendRequest = Field(default=BackendRequest(), description="which arm is moved")
+    backend: submission.BackendRequest = Field(default=submission.BackendRequest(), description="which arm is moved")
 
 
 EXAMPLES: dict[str, tuple[str, Any]] = {
-    "default": ("Everything as it comes, on the simulated arm", {"robot": EXAMPLE_ROBOT, "backend": {"name": "sim"}}),
+    "default": (
+        "Everything as it comes, on the simulated arm",
+        {"robot": submission.EXAMPLE_ROBOT, "backend": {"name": "sim"}},
+    ),
     "options": (
         "Ordinary least squares from eight periods, without a held-out motion",
         {
-            "robot": EXAMPLE_ROBOT,
+            "robot": submission.EXAMPLE_ROBOT,
             "backend": {"name": "sim", "time": "virtual"},
             "excitation": {"periods": 8, "seed": 3},
             "held_out": None,
@@ -68,13 +54,13 @@ EXAMPLES: dict[str, tuple[str, Any]] = {
 StepName = Literal["design", "run", "held-out design", "held-out run", "identify", "diagnose"]
 
 
-class CampaignStepAnswer(AnswerModel):
+class CampaignStepAnswer(answers.AnswerModel):
     name: StepName = Field(description="of the step")
     state: str = Field(description="waiting, or the state of its excitation, run, identification or diagnosis")
     link: str | None = Field(default=None, description="its excitation, run, identification or diagnosis")
 
 
-class CampaignLinksAnswer(MotionLinks):
+class CampaignLinksAnswer(answers.MotionLinks):
     recordings: tuple[str, ...] = Field(default=(), description="recordings that the model is made from")
     held_out: tuple[str, ...] = Field(default=(), description="recordings that it is judged by")
     identification: str | None = Field(default=None, description="its identification, exports included")
@@ -82,13 +68,13 @@ class CampaignLinksAnswer(MotionLinks):
     result: str | None = Field(default=None, description="its result, once it succeeded")
 
 
-class CampaignAnswer(JobAnswer):
+class CampaignAnswer(answers.JobAnswer):
     backend: BackendChoice | None = Field(default=None, description="which arm is moved")
     steps: tuple[CampaignStepAnswer, ...] = Field(default=(), description="in their order")
     links: CampaignLinksAnswer = Field(description="where to go on")
 
 
-class CampaignResult(AnswerModel):
+class CampaignResult(answers.AnswerModel):
     schema_: Literal["tauscope.campaign/1"] = Field(default="tauscope.campaign/1", alias="schema", description="form")
     identification: IdentificationDocument = Field(description="the same document as `tauscope identify --json`")
     diagnosis: DiagnosisDocument | None = Field(default=None, description="as `tauscope diagnose --json`, if asked for")
@@ -96,7 +82,7 @@ class CampaignResult(AnswerModel):
     links: CampaignLinksAnswer = Field(description="everything that was made on the way")
 
 
-class CampaignStopAnswer(AnswerModel):
+class CampaignStopAnswer(answers.AnswerModel):
     id: str = Field(description="identifier of the campaign")
     state: JobState = Field(description="where it stood; it stops unless that is an end state")
 
@@ -131,8 +117,8 @@ def _links(here: str, made: CampaignLinks, *, has_result: bool) -> CampaignLinks
         self=here,
         events=f"{here}/events",
         stop=f"{here}/stop",
-        recordings=tuple(f"{ROOT}/recordings/{quote(name)}" for name in made.recordings),
-        held_out=tuple(f"{ROOT}/recordings/{quote(name)}" for name in made.held_out),
+        recordings=tuple(f"{answers.ROOT}/recordings/{quote(name)}" for name in made.recordings),
+        held_out=tuple(f"{answers.ROOT}/recordings/{quote(name)}" for name in made.held_out),
         identification=made.identification and IDENTIFICATIONS.path(made.identification),
         diagnosis=made.diagnosis and DIAGNOSES.path(made.diagnosis),
         result=f"{here}/result" if has_result else None,
@@ -146,16 +132,16 @@ class Campaigns(MovingResource):
         made, order = workspace.read_made(), workspace.read_order()
         if order is None:
             links = _links(here, made, has_result=False)
-            return CampaignAnswer(**describe_damaged(identifier, here), links=links)
-        fields = describe_job(workspace, here)
+            return CampaignAnswer(**answers.describe_damaged(identifier, here), links=links)
+        fields = answers.describe_job(workspace, here)
         links = _links(here, made, has_result=fields["state"] is JobState.SUCCEEDED)
         steps = tuple(_steps(services, order, made))
         return CampaignAnswer(**fields, robot=order.robot_name, backend=order.backend, steps=steps, links=links)
 
     @override
-    async def hand_over(self, handed: Submission[CampaignRequest]) -> str:
+    async def hand_over(self, handed: submission.Submission[CampaignRequest]) -> str:
         services, workspace, document = handed.services, handed.workspace, handed.document
-        backend = choose_backend(services.settings, document.backend, handed.robot)
+        backend = submission.choose_backend(services.settings, document.backend, handed.robot)
         permit = permit_of(handed.request, services, backend.device(handed.robot.name))
         options = {name: getattr(document, name) for name in CampaignOptions.model_fields}
         await run_in_threadpool(workspace.write_order, CampaignOrder(**handed.robot_fields, backend=backend, **options))
@@ -187,12 +173,12 @@ _MOTION_PROBLEMS = ("robot-file", "excitation", "scenario", "acquisition", "reco
     "/{identifier}/result",
     name="get_result_of_campaigns",
     summary="Fetch the result",
-    responses=problem_responses("not-found", *ENDINGS, *_MOTION_PROBLEMS, "worker-lost", "internal"),
+    responses=problem_responses("not-found", *answers.ENDINGS, *_MOTION_PROBLEMS, "worker-lost", "internal"),
 )
-def get_result(identifier: Identifier, services: ServicesDep) -> CampaignResult:
+def get_result(identifier: answers.Identifier, services: ServicesDep) -> CampaignResult:
     """The identified model, and everything that led to it; else the problem that the campaign ended in."""
     workspace = CAMPAIGNS.find(services, identifier)
-    require_success(workspace)
+    answers.require_success(workspace)
     answer, made = CAMPAIGNS.describe(services, identifier), workspace.read_made()
     document = _read_result(services, IDENTIFICATIONS, made.identification or "")
     found = None if made.diagnosis is None else _read_result(services, DIAGNOSES, made.diagnosis)
@@ -205,4 +191,4 @@ def get_result(identifier: Identifier, services: ServicesDep) -> CampaignResult:
 
 
 def _read_result(services: Services, task: QueuedTask, identifier: str) -> bytes:
-    return require_document(task.finished(services, identifier).read_result(), identifier)
+    return answers.require_document(task.finished(services, identifier).read_result(), identifier)

@@ -19,13 +19,7 @@ from tauscope.server.http.reading import READING
 from tauscope.server.http.services import ServicesDep, require_no_evidence
 from tauscope.server.http.tasks.submission import robot_part_rules
 from tauscope.server.problems import ProblemError, problem_responses
-from tauscope.server.queue.received_files import (
-    Understanding,
-    check_kept_recording,
-    read_kept_samples,
-    read_received_robot,
-    understand_recording,
-)
+from tauscope.server.queue import received_files
 from tauscope.server.store.files import KeptFile
 from tauscope.server.store.recordings import StoredRecording
 from tauscope.tasks.task import ReadingOptions
@@ -101,7 +95,7 @@ async def report_on_recording(
 ) -> RecordingReport:
     """What it holds, and what to look at before trusting it."""
     path = await run_in_threadpool(services.recordings.path, name)
-    return await services.reading.call(request, check_kept_recording, path, joint_count)
+    return await services.reading.call(request, received_files.check_kept_recording, path, joint_count)
 
 
 @router.get(
@@ -123,7 +117,7 @@ async def get_samples(request: Request, name: Name, services: ServicesDep, most:
     `shown`), then each column as little-endian 32-bit floats; time counts from the first sample.
     """
     path = await run_in_threadpool(services.recordings.path, name)
-    content = await services.reading.call(request, read_kept_samples, path, most)
+    content = await services.reading.call(request, received_files.read_kept_samples, path, most)
     return Response(content, media_type="application/octet-stream")
 
 
@@ -173,7 +167,7 @@ _MAPPING_BODY = form_body(
     responses=problem_responses("bad-request", "limit-exceeded", "media-type", "robot-file", *READING),
     openapi_extra={"requestBody": {"required": True, "content": _MAPPING_BODY}},
 )
-async def check_sent_recording(request: Request, services: ServicesDep) -> Understanding:
+async def check_sent_recording(request: Request, services: ServicesDep) -> received_files.Understanding:
     """Its columns and units as they are understood, and what it holds when it is read so; nothing is kept."""
     async with contextmanager_in_threadpool(services.recordings.stage()) as folder:
         settings, robots = services.settings, FilePath(folder) / "robot"
@@ -186,8 +180,10 @@ async def check_sent_recording(request: Request, services: ServicesDep) -> Under
         form = await receive_form(request, rules)
         file, robot_file = _require_file(form), form.file("robot")
         options = parse_document(form.texts.get("request", b"{}"), ReadingRequest, within="part request")
-        robot = robot_file and await run_in_threadpool(read_received_robot, robots, robot_file.name)
-        return await services.reading.call(request, understand_recording, file.path, robot, options.reading)
+        robot = robot_file and await run_in_threadpool(received_files.read_received_robot, robots, robot_file.name)
+        return await services.reading.call(
+            request, received_files.understand_recording, file.path, robot, options.reading
+        )
 
 
 def _require_file(form: ReceivedForm) -> KeptFile:

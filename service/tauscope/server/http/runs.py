@@ -35,15 +35,8 @@ from tauscope.server.http.leases import permit_of
 from tauscope.server.http.openapi import binary_part, file_responses
 from tauscope.server.http.services import Services, ServicesDep
 from tauscope.server.http.settings import Settings
+from tauscope.server.http.tasks import submission
 from tauscope.server.http.tasks.router import MovingResource
-from tauscope.server.http.tasks.submission import (
-    EXAMPLE_ROBOT,
-    BackendRequest,
-    Received,
-    RobotRequest,
-    Submission,
-    choose_backend,
-)
 from tauscope.server.problems import Problem, ProblemError
 from tauscope.server.queue.analyses import ExcitationOrder, ExcitationWorkspace
 from tauscope.server.queue.received_files import check_trajectory
@@ -55,10 +48,10 @@ from tauscope.tasks.run import BackendChoice
 RecordingFormat = Literal["mcap", "csv", "parquet"]
 
 
-class RunRequest(RunOptions, RobotRequest, strict=True):
+class RunRequest(RunOptions, submission.RobotRequest, strict=True):
     """Which run is wanted."""
 
-    backend: BackendRequest = Field(default=BackendRequest(), description="which arm is moved")
+    backend: submission.BackendRequest = Field(default=submission.BackendRequest(), description="which arm is moved")
     excitation: str | None = Field(
         default=None,
         description="identifier of an excitation that succeeded; its robot is taken where none is sent; null, and no"
@@ -76,11 +69,14 @@ class RunRequest(RunOptions, RobotRequest, strict=True):
 
 
 EXAMPLES: dict[str, tuple[str, Any]] = {
-    "default": ("The default motion on the simulated arm", {"robot": EXAMPLE_ROBOT, "backend": {"name": "sim"}}),
+    "default": (
+        "The default motion on the simulated arm",
+        {"robot": submission.EXAMPLE_ROBOT, "backend": {"name": "sim"}},
+    ),
     "options": (
         "The host closes the loop, 250 times a second, against the clock",
         {
-            "robot": EXAMPLE_ROBOT,
+            "robot": submission.EXAMPLE_ROBOT,
             "backend": {"name": "sim", "time": "real"},
             "mode": "torque",
             "rate_hz": 250.0,
@@ -179,7 +175,7 @@ def _links(here: str, excitation: str | None, record: RunRecord | None, workspac
 LARGEST_TRAJECTORY = 64 * 2**20  # bytes of the largest trajectory file that is accepted
 
 
-def _prepare(handed: Submission[RunRequest]) -> tuple[RunRequestRecord, bool]:
+def _prepare(handed: submission.Submission[RunRequest]) -> tuple[RunRequestRecord, bool]:
     """What is asked for, and whether its trajectory was sent."""
     document, is_sent = handed.document, handed.form.file("trajectory") is not None
     if document.trajectory is not None:
@@ -190,7 +186,7 @@ def _prepare(handed: Submission[RunRequest]) -> tuple[RunRequestRecord, bool]:
         is_sent = True
     if is_sent and document.excitation is not None:
         raise ProblemError("invalid-request", "excitation and trajectory were both given; give one motion")
-    backend = choose_backend(handed.services.settings, document.backend, handed.robot)
+    backend = submission.choose_backend(handed.services.settings, document.backend, handed.robot)
     order = RunRequestRecord(
         **handed.robot_fields,
         backend=backend,
@@ -201,7 +197,9 @@ def _prepare(handed: Submission[RunRequest]) -> tuple[RunRequestRecord, bool]:
     return order, is_sent
 
 
-def _submit(order: RunRequestRecord, handed: Submission[RunRequest], permit: Permit, *, is_sent: bool) -> str:
+def _submit(
+    order: RunRequestRecord, handed: submission.Submission[RunRequest], permit: Permit, *, is_sent: bool
+) -> str:
     """Start a run; where there is no motion, one is designed first."""
     services, workspace = handed.services, handed.workspace
     kind, motion = services.kinds["excitation"], ready_motion
@@ -263,7 +261,7 @@ class Runs(MovingResource):
         return {"trajectory": PartRule(most, workspace.trajectories, default_name="trajectory.json")}
 
     @override
-    def put_robot(self, received: Received[RunRequest], services: Services, workspace: RunWorkspace) -> str:
+    def put_robot(self, received: submission.Received[RunRequest], services: Services, workspace: RunWorkspace) -> str:
         document, has_robot = received.document, received.form.file("robot") or received.document.robot
         if document.excitation is None or has_robot:
             return super().put_robot(received, services, workspace)
@@ -273,7 +271,7 @@ class Runs(MovingResource):
         return "robot.yaml" if order is None else order.robot_file
 
     @override
-    async def hand_over(self, handed: Submission[RunRequest]) -> str:
+    async def hand_over(self, handed: submission.Submission[RunRequest]) -> str:
         request, services, workspace = handed.request, handed.services, handed.workspace
         order, is_sent = await run_in_threadpool(_prepare, handed)
         permit = permit_of(request, services, order.device)

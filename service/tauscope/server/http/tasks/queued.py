@@ -14,14 +14,7 @@ from tauscope.errors import ExportError, LimitExceededError, NotFoundError
 from tauscope.export.formats import ExportFormat
 from tauscope.robot.messages import nearest, shown
 from tauscope.server.auth.gate import find_caller
-from tauscope.server.http.answers import (
-    ENDINGS,
-    Identifier,
-    describe_damaged,
-    describe_job,
-    require_document,
-    require_success,
-)
+from tauscope.server.http import answers
 from tauscope.server.http.bodies import PartRule
 from tauscope.server.http.openapi import file_contents
 from tauscope.server.http.services import Services, ServicesDep, require_no_model
@@ -92,7 +85,7 @@ class QueuedTask(Resource):
     def finished(self, services: Services, identifier: str) -> TaskWorkspace[Any]:
         """Raises NotFoundError if there is none, ProblemError if it has not succeeded."""
         workspace = self.find(services, identifier)
-        require_success(workspace)
+        answers.require_success(workspace)
         return workspace
 
     @override
@@ -116,7 +109,7 @@ class QueuedTask(Resource):
                 **problem_responses("not-found", "in-use"),
             },
         )
-        def cancel_or_remove(identifier: Identifier, services: ServicesDep) -> Any:
+        def cancel_or_remove(identifier: answers.Identifier, services: ServicesDep) -> Any:
             """One that waits or runs is cancelled; one that has ended is removed, unless it is a model in use."""
             if self.find(services, identifier).has_ended():
                 require_no_model(services, identifier)
@@ -133,21 +126,23 @@ class QueuedTask(Resource):
             response_class=Response,
             responses={
                 200: document.answer,
-                **problem_responses("not-found", *ENDINGS, *self.work_problems, "worker-lost", "internal"),
+                **problem_responses("not-found", *answers.ENDINGS, *self.work_problems, "worker-lost", "internal"),
             },
         )
-        def get_document(identifier: Identifier, services: ServicesDep) -> Response:
+        def get_document(identifier: answers.Identifier, services: ServicesDep) -> Response:
             content = self.finished(services, identifier).read_output(document.output)
             if content is None and document.missing is not None:
                 raise NotFoundError(document.missing)
             headers = PAGE_HEADERS if document.media_type == HTML else None
-            return Response(require_document(content, identifier), headers=headers, media_type=document.media_type)
+            return Response(
+                answers.require_document(content, identifier), headers=headers, media_type=document.media_type
+            )
 
     def _add_exports(self, router: APIRouter) -> None:
         formats = self.workspace.formats
         content = file_contents(*{file.media_type for file in formats.values()})
         schema = {"enum": [kind.value for kind in formats]}
-        problems = ("not-found", *ENDINGS, "export", "recording", "identification", "worker-lost", "internal")
+        problems = ("not-found", *answers.ENDINGS, "export", "recording", "identification", "worker-lost", "internal")
 
         @router.get(
             "/{identifier}/exports/{format}",
@@ -158,7 +153,7 @@ class QueuedTask(Resource):
             responses={200: {"content": content, "description": "the file"}, **problem_responses(*problems)},
         )
         def get_export(
-            identifier: Identifier,
+            identifier: answers.Identifier,
             format_: Annotated[
                 str, Path(alias="format", description="what to write", json_schema_extra=schema, examples=["c"])
             ],
@@ -180,8 +175,8 @@ class QueuedTask(Resource):
         here, order = self.path(identifier), workspace.read_order()
         links: dict[str, Any] = {"self": here, "events": f"{here}/events"}
         if order is None:
-            return answer(**describe_damaged(identifier, here), links=links)
-        fields, refused = describe_job(workspace, here), workspace.refused_exports()
+            return answer(**answers.describe_damaged(identifier, here), links=links)
+        fields, refused = answers.describe_job(workspace, here), workspace.refused_exports()
         if fields["state"] is JobState.SUCCEEDED:
             there = [e for e in self.documents if e.missing is None or (workspace.folder / e.output).is_file()]
             names = [*(document.name for document in there), *self.links]

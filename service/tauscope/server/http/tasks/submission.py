@@ -16,19 +16,8 @@ from tauscope.robot import Robot
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
 from tauscope.runtime.drivers import BackendName, find_driver
+from tauscope.server.http import bodies
 from tauscope.server.http.answers import ROOT, AnswerModel
-from tauscope.server.http.bodies import (
-    FORM,
-    JSON,
-    PartRule,
-    ReceivedForm,
-    media_type,
-    parse_document,
-    read_document,
-    receive_form,
-    refuse_media_type,
-    to_json_text,
-)
 from tauscope.server.http.openapi import ROBOT_PARTS, Examples, form_body, json_body, refer_to_model
 from tauscope.server.http.services import Services
 from tauscope.server.http.settings import Settings
@@ -76,16 +65,16 @@ class RobotVersionAnswer(AnswerModel):
         return cls(**asdict(robot), link=f"{ROOT}/robots/versions/{robot.version}")
 
 
-def robot_part_rules(folder: Path) -> dict[str, PartRule]:
+def robot_part_rules(folder: Path) -> dict[str, bodies.PartRule]:
     return {
-        "robot": PartRule(LARGEST_ROBOT_FILE, folder, default_name="robot.yaml"),
-        "urdf": PartRule(LARGEST_XML, folder),
+        "robot": bodies.PartRule(LARGEST_ROBOT_FILE, folder, default_name="robot.yaml"),
+        "urdf": bodies.PartRule(LARGEST_XML, folder),
     }
 
 
 def keep_inline_robot(folder: Path, robot: Mapping[str, Any]) -> str:
     """Write a robot that came as JSON. Raises RobotFileError if it is not plain data, or too large."""
-    text = to_json_text(robot, "robot", RobotFileError)
+    text = bodies.to_json_text(robot, "robot", RobotFileError)
     (folder / INLINE_NAME).write_text(text, encoding="utf-8")
     return INLINE_NAME
 
@@ -131,7 +120,7 @@ Document = TypeVar("Document", bound=RobotRequest)
 @dataclass(frozen=True)
 class Received(Generic[Document]):
     document: Document
-    form: ReceivedForm
+    form: bodies.ReceivedForm
 
 
 @dataclass(frozen=True)
@@ -155,20 +144,20 @@ async def receive_request(
     kind: type[Document],
     settings: Settings,
     robot_folder: Path,
-    further_parts: Mapping[str, PartRule] | None = None,
+    further_parts: Mapping[str, bodies.PartRule] | None = None,
 ) -> Received[Document]:
     """Read JSON or a form. Raises ProblemError or LimitExceededError."""
-    if media_type(request) == JSON:
-        return Received(await read_document(request, kind, settings.max_document_bytes), ReceivedForm())
-    if media_type(request) != FORM:
-        raise refuse_media_type(request, JSON, FORM)
+    if bodies.media_type(request) == bodies.JSON:
+        return Received(await bodies.read_document(request, kind, settings.max_document_bytes), bodies.ReceivedForm())
+    if bodies.media_type(request) != bodies.FORM:
+        raise bodies.refuse_media_type(request, bodies.JSON, bodies.FORM)
     rules = {
-        "request": PartRule(settings.max_document_bytes),
+        "request": bodies.PartRule(settings.max_document_bytes),
         **robot_part_rules(robot_folder),
         **(further_parts or {}),
     }
-    form = await receive_form(request, rules)
-    return Received(parse_document(form.texts.get("request", b"{}"), kind, within="part request"), form)
+    form = await bodies.receive_form(request, rules)
+    return Received(bodies.parse_document(form.texts.get("request", b"{}"), kind, within="part request"), form)
 
 
 def keep_robot(received: Received[Any], folder: Path, robots: RobotStore) -> str:
@@ -219,7 +208,7 @@ class BackendRequest(StrictModel):
 def choose_backend(settings: Settings, request: BackendRequest, robot: Robot) -> BackendChoice:
     """Raises ScenarioError, or RobotFileError if a drive names a file or a simulated arm has no model."""
     if request.scenario is not None:
-        to_json_text(request.scenario, "scenario", ScenarioError)
+        bodies.to_json_text(request.scenario, "scenario", ScenarioError)
     name = request.name or settings.backend
     driver = find_driver(name)
     _refuse_files(robot, driver.file_keys)
