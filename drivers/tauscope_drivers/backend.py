@@ -121,4 +121,3 @@ class Backend(Protocol):
 
     def disconnect(self) -> None:
         """Let go of the bus; an arm that is still enabled is stopped by its own policy first."""
-        ...

@@ -46,8 +46,10 @@ class ScenarioDocument(Document):
     effects: list[Any] = Field(default_factory=list, max_length=MOST_EFFECTS)
 
 
-def read_scenario(path: Path | str, robot: Robot) -> Scenario:
-    """The scenario of a file. Raises ScenarioError, one line that names file, entry and key, if it is not valid."""
+def read_scenario(path: Path | str | None, robot: Robot) -> Scenario:
+    """The scenario of a file; None conceals nothing. Raises ScenarioError: one line, names file, entry and key."""
+    if path is None:
+        return Scenario()
     try:
         data = read_bounded(Path(path), LARGEST_SCENARIO_FILE)
     except RobotFileError as error:

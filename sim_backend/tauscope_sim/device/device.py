@@ -2,7 +2,7 @@
 
 import copy
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,10 +25,10 @@ _TICK_S = TICK_NS * 1e-9
 _TICKS_PER_TEMPERATURE = 64
 
 
-@dataclass(frozen=True)
-class _Enabling:
-    stop_policy: StopPolicy
-    watchdog_ns: int
+def list_capabilities(joint_count: int, largest_rate_hz: float) -> Capabilities:
+    """What simulated drives can do, at a rate that a connection to them carries [Hz]."""
+    modes, policies = frozenset(ControlMode), frozenset(StopPolicy)
+    return Capabilities(joint_count, modes, policies, largest_rate_hz, WATCHDOG_RANGE_S, takes_feed_forward=True)
 
 
 class SimulatedDevice:
@@ -62,17 +62,10 @@ class SimulatedDevice:
         self._pending: deque[tuple[float, Setpoint]] = deque()
         self._latch = FaultLatch()
         self._activity = Activity.BRAKED
-        self._enabling: _Enabling | None = None
+        self._enabling: tuple[StopPolicy, int] | None = None  # how it is stopped, and after which silence [ns]
         self._start_ns, self._tick = start_ns, 0
         self._sample_ns = self._fed_ns = start_ns
-        self.capabilities = Capabilities(
-            joint_count=count,
-            modes=frozenset(ControlMode),
-            stop_policies=frozenset(StopPolicy),
-            largest_rate_hz=1.0 / _TICK_S,
-            watchdog_range_s=WATCHDOG_RANGE_S,
-            takes_feed_forward=True,
-        )
+        self.capabilities = list_capabilities(count, 1.0 / _TICK_S)
 
     @property
     def time_ns(self) -> int:
@@ -130,7 +123,7 @@ class SimulatedDevice:
         motion = self._motion()
         require_sensible(limits, motion.position, [f"joint {number + 1}" for number in range(len(motion.position))])
         self._drives.enable(self._activity, motion, copy.deepcopy(limits))
-        self._enabling = _Enabling(stop_policy, round(watchdog_s * 1e9))
+        self._enabling = stop_policy, round(watchdog_s * 1e9)
         self._activity = commanded_by(mode)
         self._fed_ns = self._sample_ns
 
@@ -153,7 +146,7 @@ class SimulatedDevice:
     def stop(self, policy: StopPolicy | None = None) -> None:
         """Stop the arm; legal at any time. Setpoints that are still on their way are forgotten."""
         if policy is None and self._enabling is not None and self._activity in COMMANDED:
-            policy = self._enabling.stop_policy
+            policy = self._enabling[0]
         self._enabling = None
         if policy is not None:
             self._stop(policy)
@@ -202,7 +195,7 @@ class SimulatedDevice:
             return
         motion = self._motion()
         if self._enabling is not None and self._activity in COMMANDED:
-            self._serve_host(self._enabling, motion)
+            self._serve_host(self._enabling[1], motion)
         try:
             self._mechanism.move(self._drives.torque(self._activity, motion, self._tick), self._tick)
         except ScenarioError as error:
@@ -210,13 +203,13 @@ class SimulatedDevice:
             self._activity = Activity.BRAKED
             self._latch.latch(device_fault(FaultCode.UNSTABLE, None, str(error)))
 
-    def _serve_host(self, enabling: _Enabling, motion: Motion) -> None:
+    def _serve_host(self, watchdog_ns: int, motion: Motion) -> None:
         """Take the setpoints that are due; stop where none has come for too long, or where one leads too far."""
         while self._pending and self._pending[0][0] <= self._tick:
             arrival, setpoint = self._pending.popleft()
             self._drives.command(self._activity, setpoint, arrival)
         silence_ns = self._sample_ns - self._fed_ns
-        if silence_ns >= enabling.watchdog_ns:
+        if silence_ns >= watchdog_ns:
             self._trip(FaultCode.WATCHDOG, None, f"no setpoint for {silence_ns * 1e-6:.1f} ms")
         elif self._activity is Activity.TORQUE and (overrun := self._drives.overrun(motion)) is not None:
             self._trip(*overrun)
@@ -236,7 +229,7 @@ class SimulatedDevice:
         """Latch a fault; where the host has the arm, stop by the policy that it left."""
         self._latch.latch(device_fault(code, joint, detail))
         if self._enabling is not None and self._activity in COMMANDED:
-            self._stop(self._enabling.stop_policy)
+            self._stop(self._enabling[0])
 
     def _look_for_faults(self) -> None:
         temperature = self._mechanism.true.temperature + self._disturbances.heat

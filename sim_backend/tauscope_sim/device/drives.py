@@ -99,7 +99,7 @@ class Drives:
 
     def hold(self, before: Activity, motion: Motion) -> None:
         """Bring the joints to rest and hold them."""
-        if before is Activity.TRACKING or self._waits_for_torque(before):
+        if before is Activity.TRACKING or (before is Activity.TORQUE and self._commanded_torque is None):
             self._servo.absorb(self._target.feed_forward)
             self._target.brake()
             return
@@ -148,6 +148,3 @@ class Drives:
 
     def _target_at(self, motion: Motion) -> Target:
         return Target(motion.position, motion.velocity, self._acceleration, self._tick_s)
-
-    def _waits_for_torque(self, activity: Activity) -> bool:
-        return activity is Activity.TORQUE and self._commanded_torque is None

@@ -31,7 +31,7 @@ from tauscope_drivers import (
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_drivers.limits import require_finite
 from tauscope_sim.device import messages
-from tauscope_sim.device.device import WATCHDOG_RANGE_S
+from tauscope_sim.device.device import list_capabilities
 from tauscope_sim.device.faults import Injection
 from tauscope_sim.own_process import process_environment
 
@@ -147,14 +147,7 @@ class RemoteSimulatedArm:
     @property
     def capabilities(self) -> Capabilities:
         """What it can do."""
-        return Capabilities(
-            joint_count=self._count,
-            modes=frozenset(ControlMode),
-            stop_policies=frozenset(StopPolicy),
-            largest_rate_hz=LARGEST_RATE_HZ,
-            watchdog_range_s=WATCHDOG_RANGE_S,
-            takes_feed_forward=True,
-        )
+        return list_capabilities(self._count, LARGEST_RATE_HZ)
 
     @property
     def clock(self) -> Clock:
