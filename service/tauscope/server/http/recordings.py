@@ -21,7 +21,6 @@ from tauscope.server.http.tasks.submission import robot_part_rules
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue import received_files
 from tauscope.server.store.files import KeptFile
-from tauscope.server.store.recordings import StoredRecording
 from tauscope.tasks.task import ReadingOptions
 
 
@@ -68,21 +67,21 @@ async def keep_recording(request: Request, response: Response, services: Service
         kept, is_new = await run_in_threadpool(services.recordings.keep, file)
     response.status_code = 201 if is_new else 200
     response.headers["Location"] = f"{request.url.path}/{quote(kept.name)}"
-    return _answer(kept)
+    return RecordingAnswer.model_validate(kept)
 
 
 @router.get("", summary="List the recordings on the server")
 def list_recordings(services: ServicesDep, limit: RecordingLimit = 1000, after: After = None) -> RecordingListAnswer:
     """Sent ones, and those that the operator put into the folder."""
     entries = [entry for entry in services.recordings.entries() if after is None or entry.name > after]
-    page = [_answer(entry) for entry in entries[:limit]]
+    page = [RecordingAnswer.model_validate(entry) for entry in entries[:limit]]
     return RecordingListAnswer(recordings=page, next=page[-1].name if len(entries) > limit else None)
 
 
 @router.get("/{name}", summary="Look a recording up", responses=problem_responses("not-found"))
 def get_recording(name: Name, services: ServicesDep) -> RecordingAnswer:
     """Size, time and sha256."""
-    return _answer(services.recordings.find(name))
+    return RecordingAnswer.model_validate(services.recordings.find(name))
 
 
 @router.get(
@@ -143,10 +142,6 @@ def remove_recording(name: Name, services: ServicesDep) -> None:
     services.recordings.path(name)
     require_no_evidence(services, name)
     services.recordings.remove(name)
-
-
-def _answer(recording: StoredRecording) -> RecordingAnswer:
-    return RecordingAnswer.model_validate(recording)
 
 
 mapping_router = APIRouter(prefix="/mappings", tags=["recordings"], responses=problem_responses("invalid-request"))

@@ -190,6 +190,20 @@ def _assemble(
     runs = RunManager(items["run"], recordings, start, claims, heartbeat.is_alive, metrics.run_ended)
     dependencies = CampaignDependencies(jobs, kinds, runs, recordings)
     campaigns = CampaignManager(items["campaign"], dependencies)
+
+    def check_workers() -> str | None:
+        if not jobs.can_work():
+            return "the Dask cluster does not answer, and jobs wait for it"
+        return readers.obstacle if isinstance(readers, WorkerPool) else None
+
+    checks = {
+        "service": lambda: "the service is ending" if closing.is_set() else None,
+        "database": partial(check_database, database.check),
+        "disk": partial(check_disk, settings.data_folder),
+        "workers": check_workers,
+        "clock": Clock().check,
+        "audit log": lambda: f"{audit.lost} entries of the audit log were lost" if audit.lost else None,
+    }
     models = ModelRegistry(ModelHistory(database), site, items)
     index = open_index(Index(database, site), items, recordings, settings.data_folder.name)
     # What a schedule moves has no lease: it waits for its next time where somebody has one.
@@ -209,7 +223,7 @@ def _assemble(
         audit=audit,
         answers=StoredAnswers(settings.data_folder / "idempotency"),
         metrics=metrics,
-        readiness=Readiness(_collect_checks(settings, database, jobs, readers, audit, closing)),
+        readiness=Readiness(checks),
         closing=closing,
         feeds=EventFeeds(closing),
         heartbeat=heartbeat,
@@ -217,29 +231,6 @@ def _assemble(
         models=models,
         schedules=Scheduler(ScheduleRepository(database, site, new_boot()), repeater, settings.data_folder),
     )
-
-
-def _collect_checks(
-    settings: Settings,
-    database: Database,
-    jobs: JobQueue,
-    readers: Executor,
-    audit: AuditTrail,
-    closing: threading.Event,
-) -> dict[str, Callable[[], str | None]]:
-    def check_workers() -> str | None:
-        if not jobs.can_work():
-            return "the Dask cluster does not answer, and jobs wait for it"
-        return readers.obstacle if isinstance(readers, WorkerPool) else None
-
-    return {
-        "service": lambda: "the service is ending" if closing.is_set() else None,
-        "database": partial(check_database, database.check),
-        "disk": partial(check_disk, settings.data_folder),
-        "workers": check_workers,
-        "clock": Clock().check,
-        "audit log": lambda: f"{audit.lost} entries of the audit log were lost" if audit.lost else None,
-    }
 
 
 def open_readers(settings: Settings) -> Executor:

@@ -74,7 +74,10 @@ def assets() -> Mapping[str, Asset]:
     paths |= {name: Path(str(package.locate_file(file))) for name, file in PLOT_LIBRARY.items()}
     contents = {name: path.read_bytes() for name, path in paths.items()}
     contents["drivers.js"] = _drivers_script()
-    return {name: _asset(name, content) for name, content in contents.items()}
+    return {
+        name: Asset(content, MEDIA_TYPES[Path(name).suffix], f'"{hashlib.sha256(content).hexdigest()[:24]}"')
+        for name, content in contents.items()
+    }
 
 
 def _drivers_script() -> bytes:
@@ -82,7 +85,3 @@ def _drivers_script() -> bytes:
     drivers = [find_driver(name) for name in driver_names()]
     content = {one.name: {"title": one.title, "is_simulated": one.is_simulated} for one in drivers}
     return f"export const DRIVERS = {json.dumps(content, ensure_ascii=False)};\n".encode()
-
-
-def _asset(name: str, content: bytes) -> Asset:
-    return Asset(content, MEDIA_TYPES[Path(name).suffix], f'"{hashlib.sha256(content).hexdigest()[:24]}"')
