@@ -28,11 +28,7 @@ class MujocoLog:
     """Steps a simulation and keeps its joints' state before each step, the torque in it, and commands."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, joints: Sequence[str] | None = None) -> None:
-        """Take a simulation; nothing of it is changed.
-
-        Raises RecordingError where a joint is not there, or is no hinge or slide.
-        `joints`: hinges and slides, base first; None: all of them, as the file has them.
-        """
+        """Take a simulation's `joints`, base first; None: all. Raises RecordingError: missing, or no hinge or slide."""
         every = [model.joint(index).name for index in range(model.njnt) if model.jnt_type[index] in HINGE_OR_SLIDE]
         self.joints = tuple(every if joints is None else joints)
         for name in self.joints:

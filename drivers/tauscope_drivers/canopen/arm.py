@@ -106,11 +106,7 @@ class CanopenArm:
         watchdog_s: float,
         cycle_s: float | None = None,
     ) -> ArmState:
-        """Configure and commission every drive, arm its heartbeat consumer, take all to *operation enabled* together.
-
-        `cycle_s`: time between two SYNCs, over which the drives interpolate; they keep the one that they know where
-        None [s].
-        """
+        """Commission every drive, arm its heartbeat, enable all. `cycle_s`: of SYNCs; None: the drives' [s]."""
         session = self._require_session()
         if self._mode is not None:
             raise DriverError.refusal("the arm is enabled already; stop it first")

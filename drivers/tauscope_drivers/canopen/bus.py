@@ -88,11 +88,7 @@ class CanBus:
             raise self._report_loss(error) from error
 
     def send_together(self, frames: Iterable[tuple[int, bytes]]) -> None:
-        """Send frames one after the other, with one write where the adapter takes that.
-
-        Raises DriverError ``lost`` where the bus does not take them.
-        `frames`: iterable of (int, bytes), identifier and payload of each, in their order.
-        """
+        """Send frames, identifier and payload, in their order, with one write where possible. Raises ``lost``."""
         gathering = self._bus.gathering() if isinstance(self._bus, SerialAdapterBus) else nullcontext()
         try:
             with gathering:
@@ -102,12 +98,7 @@ class CanBus:
             raise self._report_loss(error) from error
 
     def receive(self, deadline_ns: int) -> bool:
-        """Wait for one frame and hand it to its handler; the heartbeat is sent meanwhile when it is due.
-
-        Raises DriverError ``lost`` where the bus is gone.
-
-        Returns bool: False where none came.
-        """
+        """Wait for one frame and hand it to its handler, beating meanwhile; False: none came. Raises ``lost``."""
         self.beat()
         wait_s = max(0.0, (deadline_ns - time.monotonic_ns()) * 1e-9)
         if self._heartbeat_period_ns:

@@ -53,11 +53,7 @@ class BusConfiguration:
 
 
 def read_configuration(joints: Sequence[drive_block.DriveJoint]) -> BusConfiguration:
-    """Bus and drives of an arm.
-
-    Raises DriverError ``refused`` where a key is missing, unknown or not usable, or the EDS or DCF file describes no
-    drive that the driver can use; names the joint and the key.
-    """
+    """Bus and drives of an arm. Raises DriverError ``refused``: names joint and key, or what an EDS or DCF lacks."""
     first = joints[0]
     drive_block.require_known_keys(joints, _BUS_KEYS, _NODE_KEYS)
     nodes = tuple(read_node(joint) for joint in joints)

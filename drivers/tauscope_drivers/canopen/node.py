@@ -191,11 +191,7 @@ class DriveNode:
         self.error_code = self.values.get(objects.ERROR_CODE) or self.error_code
 
     def targets(self, mode: ControlMode, controlword: int, position: float, torque: float) -> list[tuple[int, bytes]]:
-        """Identifier and payload of its target frames.
-
-        Raises DriverError ``refused`` where the target is beyond what the drive can be told.
-        `position`: of the joint, finite [rad or m]; `torque`: of the joint, finite [Nm or N].
-        """
+        """Its target frames. Raises DriverError ``refused`` beyond what it takes. [rad or m], [Nm or N]; finite."""
         target = TARGETS[mode][self.mode_numbers[mode]]
         quantity = self.units.counts(position) if mode is ControlMode.POSITION else self.units.permille(torque)
         is_enabled = controlword == ENABLE_OPERATION and self.last_state is DriveState.OPERATION_ENABLED

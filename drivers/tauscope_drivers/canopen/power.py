@@ -56,11 +56,7 @@ def _note_mode(node: DriveNode, mode: ControlMode) -> None:
 
 
 def _read_settled_place(session: Session, mode: ControlMode) -> Array:
-    """Where the joints are now, by process data, read before any drive changes its state.
-
-    One that holds may be back under power with its first target: that must not be where it was when commissioning
-    began.
-    """
+    """Where the joints are, before any drive changes its state: one that holds may be powered again with it."""
     stay = session.standstill()
 
     def cycle() -> ArmState:
@@ -100,10 +96,7 @@ _RESTART_REMEDY = "support the arm, look for a dip of its supply, then acknowled
 
 
 def stop_in_cycle(session: Session, mode: ControlMode, goal: Goal) -> bool:
-    """Stop by process data, all drives together; False where not all got there.
-
-    Nobody waits for a drive that takes no process data any more: it has stopped by itself.
-    """
+    """Stop by process data, all together; False where not all got there: a drive that takes none has stopped itself."""
 
     def is_nothing_left_to_wait_for() -> bool:
         are_stopped = all(has_stopped(node, goal) or node.is_deaf for node in session.nodes)

@@ -27,11 +27,7 @@ class PdoLayout:
 
 
 def encode_pdo(layout: PdoLayout, values: Mapping[DriveObject, int]) -> bytes:
-    """Payload of a frame.
-
-    A value that its object cannot hold is an error and never cut to size: a target that wraps round or saturates is
-    full torque. Raises OverflowError where a value does not fit its object; names the object.
-    """
+    """Payload of a frame. Raises OverflowError, never cuts to size: a target that wraps or saturates is full torque."""
     payload = bytearray()
     for entry in layout.objects:
         try:

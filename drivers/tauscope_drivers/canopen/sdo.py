@@ -80,11 +80,7 @@ class NodeDictionary:
         return int.from_bytes(self.read_data(entry), "little", signed=entry.signed)
 
     def read_surely(self, entry: DriveObject) -> int:
-        """Value of an entry that every measurement hangs on: as two readings in a row have it.
-
-        Raises DriverError: ``cannot-connect``: the node does not answer, or gives another value each time; ``refused``:
-        it has no such entry.
-        """
+        """Value of an entry that all hangs on: as two readings in a row have it. Raises DriverError as `read` does."""
         values = [self.read(entry)]
         for _ in range(_READINGS):
             values.append(self.read(entry))
@@ -161,10 +157,7 @@ def _retry_transfer(transfer: Callable[[], _Answer]) -> _Answer:
 
 
 class PumpedSdoClient(SdoClient):
-    """The library's SDO client, taking its answers off the bus itself instead of from a receiving thread.
-
-    What does not answer the last question is dropped: an answer that came too late would else be taken for the next.
-    """
+    """The library's SDO client without a receiving thread; drops what does not answer the last question."""
 
     RESPONSE_TIMEOUT = SDO_TIMEOUT_S
     MAX_RETRIES = ATTEMPTS

@@ -1,7 +1,4 @@
-"""Settings that servos had in EEPROM before a run changed them: kept on disk until they are put back.
-
-A run that holds the arm ends with servos under torque, whose EEPROM is locked: another process puts the settings back.
-"""
+"""Settings that servos had in EEPROM before a run changed them, on disk until another process may put them back."""
 
 import contextlib
 import json

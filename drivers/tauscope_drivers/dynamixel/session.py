@@ -49,10 +49,7 @@ class Session:
             self.settings[joint][name] = value
 
     def restore(self) -> None:
-        """Put back what was changed in EEPROM, on servos without torque; others keep it until they are let go.
-
-        Raises DriverError where a servo does not answer, or does not take it.
-        """
+        """Put EEPROM back on servos without torque, later on others. Raises DriverError: it is not taken."""
         for joint, kept in enumerate(self.originals):
             before = kept.before
             if not before or self.read(joint, ["Torque Enable"])["Torque Enable"]:

@@ -1,7 +1,4 @@
-"""Everything that a run writes or needs, looked at before: the same list refuses a run and fills doctor's findings.
-
-Nothing is written. Settings in EEPROM are never changed: the remedy names the register.
-"""
+"""Everything that a run needs, looked at before: it refuses a run and fills doctor's findings; writes nothing."""
 
 import math
 from collections.abc import Mapping

@@ -50,11 +50,7 @@ class SerialServoArm(ABC, Generic[_Session]):
         require_rate(rate_hz, *self._budget())
 
     def connect(self) -> ArmState:
-        """Lock the port and reach every servo; moves nothing and switches no torque on.
-
-        Raises DriverError ``cannot-connect``: connected already, the port is taken or missing, a servo is missing or of
-        the wrong kind.
-        """
+        """Lock the port, reach every servo; moves nothing. Raises DriverError ``cannot-connect``: why."""
         if self._session is not None:
             raise DriverError.no_connection("the arm is connected already; disconnect it first")
         self._lost = ()

@@ -1,7 +1,4 @@
-"""One emulated CiA 402 drive: object dictionary, power state, cyclic modes, heartbeats and emergencies.
-
-Time is passed in, frames go in and come out; what moves is behind `AxisDemand` and `AxisMeasurement`.
-"""
+"""One emulated CiA 402 drive: objects, power state, modes, heartbeats. Time and frames go in, frames come out."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

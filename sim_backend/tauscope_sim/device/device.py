@@ -164,10 +164,7 @@ class SimulatedDevice:
         self._refuse_faults()
 
     def put_back(self) -> None:
-        """Carry the arm back to where it began and set its brakes: nobody's order to the drives, but a hand's work.
-
-        Faults and disturbances are gone afterwards. Raises DriverError: ``refused`` while the arm is enabled.
-        """
+        """Carry the arm back to where it began, without faults. Raises DriverError ``refused`` while it is enabled."""
         if self._activity in COMMANDED:
             raise DriverError.refusal("the arm is enabled; stop it before carrying it back")
         self._enabling = None

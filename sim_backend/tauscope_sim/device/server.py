@@ -19,10 +19,7 @@ FIXED_COLUMNS = ("time_ns", "activity", "faults")
 
 
 class TraceWriter:
-    """Appends lines to a CSV file: time, activity, faults, true position and velocity of each joint.
-
-    Each line is written at once and by itself, so that the file is complete up to the last line when the process dies.
-    """
+    """A CSV file of time, activity, faults, true position and velocity, whole up to the last line however it ends."""
 
     def __init__(self, path: Path, device: SimulatedDevice) -> None:
         self._device = device

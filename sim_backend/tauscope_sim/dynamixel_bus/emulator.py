@@ -24,11 +24,7 @@ class DynamixelEmulator(Emulator):
     """An arm of emulated servos on one bus; the instants are those of the caller's clock."""
 
     def __init__(self, bus: EmulatedBus, arm: "Pendulums | PlantArm", now_s: float, *, latency_s: float = 0.0) -> None:
-        """Everything at rest. The arm stands on a stand until all its servos have had torque once.
-
-        `latency_s`: how much later than over the wire an answer reaches the master: the
-        latency of an adapter [s].
-        """
+        """Everything at rest, on a stand until all servos had torque. `latency_s`: of an adapter, for answers [s]."""
         super().__init__(now_s)
         self.bus = bus
         self.arm = arm

@@ -24,11 +24,7 @@ from tauscope_sim.plant.term import (
 
 
 def compliant_transmissions(effects: Sequence[PhysicalEffect], rotor_inertia: Array) -> dict[int, Transmission]:
-    """Compliant transmissions by joint, counted from 0.
-
-    Raises ScenarioError where two effects make the same joint compliant, or both give it a rotor.
-    `rotor_inertia`: (n,), that effects give to the motors of rigid joints [kg m² or kg].
-    """
+    """Compliant transmissions by joint, from 0. Raises ScenarioError. `rotor_inertia`: (n,) [kg m² or kg]."""
     found: dict[int, Transmission] = {}
     for transmission in (effect.transmission() for effect in effects):
         if transmission is None:

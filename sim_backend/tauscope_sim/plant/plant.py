@@ -138,11 +138,7 @@ class Plant:
         self._part = self._longest
 
     def advance(self, motor_torque: ArrayLike, duration_s: float) -> None:
-        """Let time pass under constant torque.
-
-        Raises ScenarioError where the duration is negative, or the motion grows beyond all bounds.
-        `motor_torque`: (n,), of the drives, on the joint's side of the gear [Nm or N].
-        """
+        """Let time pass under `motor_torque`, (n,) [Nm or N]. Raises ScenarioError: motion without bounds."""
         if not duration_s >= 0.0:
             raise ScenarioError(f"duration_s is {duration_s}; time passes forwards only")
         drive = np.asarray(motor_torque, dtype=np.float64).tolist()
