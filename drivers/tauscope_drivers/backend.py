@@ -46,9 +46,8 @@ class DriveLimits:
 class Capabilities:
     """What a backend can do, known without motion.
 
-    `policies_by_mode`: ways to stop that the device carries out itself in each mode, where they differ; None where
-        every mode has all.
-    `remarks`: what the drives do not have, and what is done in place of it; known once the arm is connected.
+    `policies_by_mode`: what the device does itself in each mode; None: all; `remarks`: what drives lack, known once
+    connected.
     """
 
     joint_count: int

@@ -20,10 +20,9 @@ from tauscope_sim.motion import FourierMotion, MotionSamples
 
 
 def rigid_body_torque(model: mujoco.MjModel, position: Array, velocity: Array, acceleration: Array) -> Array:
-    """Joint torque τ = H(q) q̈ + h(q, q̇) + c(q) along a motion, by ``mj_inverse``.
+    """Joint torque τ = H(q) q̈ + h(q, q̇) + c(q), (N, n) [Nm or N], along a motion, by ``mj_inverse``: equation (1).
 
-    `position`: (N, n), q [rad or m]; `velocity`: (N, n), q̇ [rad/s or m/s]; `acceleration`: (N, n), q̈ [rad/s² or
-    m/s²]. Returns (N, n), τ without friction, the paper's equation (1) [Nm or N].
+    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈ [rad or m, and per s, per s²].
     """
     data = mujoco.MjData(model)
     torque = np.empty_like(position)
@@ -63,15 +62,10 @@ def simulate_recording(
 ) -> SimulatedRecording:
     """Record an arm that follows a motion exactly: τ = H(q) q̈ + h(q, q̇) + c(q) + τ_f(q̇) + noise, equations (1), (6).
 
-    The noise is Gaussian, white, of zero mean, and independent between joints, as in the paper's section 3. Raises
-    RobotFileError where the robot file lacks what the simulation needs. Raises RecordingError where the settings make
-    no recording.
-
-    `rate_hz`: samples per second; each period has to hold a whole number of samples [Hz].
-    `noise_std`: (n,) or float, standard deviation of the torque noise [Nm or N].
-    `position_noise_std`: (n,) or float, standard deviation of the position noise [rad or m].
-    `encoder_step`: (n,) or float, resolution to which positions are rounded, zero for none [rad or m].
-    `friction_shape`: K_v and δ of each joint [s/rad or s/m]; the robot file's where None.
+    The noise is Gaussian, white, independent, as in the paper's section 3. `rate_hz`: a whole number of samples a
+    period; `noise_std`, `position_noise_std`, `encoder_step`: (n,) or one for all [Nm or N; rad or m];
+    `friction_shape`: K_v and δ of each joint; None: the robot file's. Raises RobotFileError, RecordingError where there
+    is no such recording.
     """
     samples_per_period = _samples_per_period(motion.period_s, rate_hz)
     if periods < 1:
@@ -151,11 +145,10 @@ def _quantise(position: Array, step: Array) -> Array:
 def write_recording_csv(
     path: Path, recording: SimulatedRecording, joints: Sequence[Joint], *, as_current: bool = False
 ) -> None:
-    """Write what a real arm's logger would have written, the joints' wiring included.
+    """Write what a real arm's logger would have written, the joints' wiring included, to the last digit.
 
-    A joint with ``sign: -1`` is recorded the other way round; with `as_current` the columns are i1…in and hold torque
-    divided by the joint's torque constant. Numbers are written so that reading them gives the same float64. Raises
-    RecordingError where the file exists, or cannot be written.
+    With `as_current` the columns are i1…in, torque by the torque constant. Raises RecordingError where the file cannot
+    be made.
     """
     signs = np.array([joint.sign for joint in joints], dtype=np.float64)
     constants = np.array([joint.torque_constant for joint in joints])

@@ -80,13 +80,9 @@ class _PlannedDictionary:
 
 
 def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:
-    """Frames of a connection, of enabling, of some cycles and of a stop, for drives that answer as they should.
+    """Frames of a connection, of enabling, of some cycles and of a stop; a heartbeat is shown once.
 
-    An SDO is shown as an expedited transfer, and one of more than four bytes by its first frame alone; heartbeats,
-    which are sent as time passes, are shown once. Raises DriverError: ``refused``: a ``drive`` block or a limit is not
-    possible.
-
-    `joints`: base first; each ``drive`` block has to state ``rated_torque_nm``.
+    Raises DriverError ``refused``. `joints`: base first; each ``drive`` block has to state ``rated_torque_nm``.
     """
     mode, limits, targets, cycle_s = request.mode, request.limits, request.targets, request.cycle_s
     configuration = read_configuration(joints)

@@ -75,11 +75,7 @@ class Measurement:
 
 @dataclass(eq=False)
 class DriveNode:
-    """A drive on the bus.
-
-    `last_position`: of the joint when it last answered: the place to stay at, never a measurement [rad or m].
-    `mode_numbers`: mode of operation for each control mode that it has.
-    """
+    """A drive. `last_position`: when it last answered, never a measurement [rad or m]; `mode_numbers`: its modes'."""
 
     configuration: NodeConfiguration
     joint: int  # number of its joint, from 1

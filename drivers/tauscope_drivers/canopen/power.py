@@ -19,11 +19,7 @@ STILL_CYCLES = 4  # cycles at one place before anything moves: drives interpolat
 
 
 def power_up(session: Session, mode: ControlMode) -> tuple[ArmState, Array]:
-    """Take all drives to *operation enabled*; targets are where the joints are when their drives get there.
-
-    Raises DriverError: ``fault`` or ``refused``: a drive does not get there. Returns the state of the last cycle, and
-    the targets that the drives stand at, (n,) [rad or m].
-    """
+    """Take all drives to *operation enabled* where they stand; the state, and targets, (n,). Raises DriverError."""
     place = _read_settled_place(session, mode)
 
     def cycle() -> ArmState:

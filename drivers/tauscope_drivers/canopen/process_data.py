@@ -204,13 +204,7 @@ def cycle_bits(nodes: int, payloads: Sequence[int]) -> int:
 
 
 def largest_rate_hz(nodes: int, payloads: Sequence[int], bit_rate: float, serial_baud: float | None = None) -> float:
-    """Most cycles a second that the bus carries, and the adapter where it is a true serial line.
-
-    `payloads`: of the PDOs of one node [bytes].
-    `serial_baud`: of the adapter's serial line at 10 bits a byte [bit/s]; None where it is none (a USB CDC adapter
-        ignores it).
-    Returns float: [Hz].
-    """
+    """Most cycles a second of bus and serial line [Hz]. `payloads`: of a node's PDOs [bytes]."""
     bus_s = cycle_bits(nodes, payloads) / (LARGEST_LOAD * bit_rate)
     return 1.0 / max(bus_s, _serial_s(nodes, payloads, serial_baud))
 

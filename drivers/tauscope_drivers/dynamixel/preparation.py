@@ -115,11 +115,7 @@ def watchdog_steps(watchdog_s: float) -> int:
 
 
 def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -> int:
-    """Most current within a torque limit, the robot file's limit and the servo's own Current Limit [units].
-
-    Raises DriverError ``refused`` where the limit cannot be turned into current, or leaves none.
-    `torque`: limit of the joint, infinite where there is none [Nm or N].
-    """
+    """Most current in all limits [units]. Raises DriverError ``refused``: none. `torque`: may be infinite [Nm or N]."""
     cap = settings["Current Limit"]
     stated_ma = servo.configuration.current_limit_ma
     if stated_ma is not None:
@@ -138,11 +134,7 @@ def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -
 
 
 def velocity_cap(servo: JointServo, settings: Mapping[str, int], velocity: float) -> int:
-    """Profile Velocity within a speed limit and the servo's own Velocity Limit, beyond which it refuses it [units].
-
-    Raises DriverError ``refused`` where the servo's own limit leaves no motion.
-    `velocity`: limit of the joint, infinite where there is none [rad/s or m/s].
-    """
+    """Profile Velocity in both limits [units]. Raises DriverError ``refused``: none. `velocity`: may be infinite."""
     cap, own = servo.units.velocity_cap(velocity), settings.get("Velocity Limit")
     if own is None:
         return cap

@@ -12,12 +12,10 @@ MULTI_TURN_COUNTS = 1_048_575  # Goal Position reaches this far both ways in the
 
 @dataclass(frozen=True)
 class ServoUnits:
-    """What one unit of a servo means at its joint.
+    """What one unit of a servo means at its joint, signed where it is mounted the other way round.
 
-    `radians_per_count`: joint position for one count, negative where the servo is mounted the other way round [rad or
-        m].
-    `torque_per_milliampere`: joint torque for one milliampere; None where the robot file does not say, for no maker's
-        figure exists [Nm/mA or N/mA].
+    `torque_per_milliampere`: of the joint; None where the robot file does not say: no maker's figure exists [Nm/mA or
+    N/mA].
     """
 
     radians_per_count: float
@@ -120,12 +118,7 @@ class JointServo:
 
 
 def make_servo(number: int, configuration: ServoConfiguration, identity: tuple[int, int] | None) -> JointServo:
-    """A servo of a joint, with the identity that it stated, or without one as its configuration promises it.
-
-    Raises DriverError ``cannot-connect`` where not the model that the robot file names, one that senses no current or
-    has no watchdog.
-    `number`: of the joint, from 1.
-    """
+    """A servo with its stated identity, or the promised one. Raises DriverError ``cannot-connect``: unfit."""
     place = f"joint {configuration.joint} (servo {configuration.servo})"
     if identity is not None:
         model, firmware = find_model(*identity), identity[1]

@@ -41,13 +41,10 @@ def plan_tasks(session: Session, limits: DriveLimits) -> list[ServoTask]:
 
 
 def enable_servos(session: Session, tasks: Sequence[ServoTask]) -> list[int]:
-    """Give each servo its limits and its place for a goal, then torque, one servo after the other.
+    """Give each servo its limits and its place for a goal, then torque, one after the other; their goals [counts].
 
-    An arm may fall meanwhile: each servo is asked for its place at the last moment, and catches its joint there. Where
-    one fails, those that had no torque before are let go again. Raises DriverError where a servo does not answer, or
-    does not take what it is told.
-
-    Returns list of int: Goal Position of each servo [counts].
+    Each is asked for its place at the last moment: an arm may fall. Where one fails, those that had no torque are let
+    go. Raises DriverError.
     """
     held_before = session.health.has_torque.copy()
     reached: list[int] = []

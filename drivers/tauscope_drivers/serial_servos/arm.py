@@ -79,11 +79,10 @@ class SerialServoArm(ABC, Generic[_Session]):
         watchdog_s: float,
         cycle_s: float | None = None,
     ) -> ArmState:
-        """Take the arm under power where it stands.
+        """Take the arm under power where it stands. Raises DriverError: ``not-connected``, ``refused`` or ``fault``.
 
-        Raises DriverError: ``not-connected``, ``refused`` or ``fault``.
-        `watchdog_s`: longest silence of the host [s]; `cycle_s`: time between two goals, over which the servos go from
-        one to the next; they leap where it is None, or too short for a bus that has to carry the speeds as well [s].
+        `watchdog_s`: longest silence of the host; `cycle_s`: between goals; servos leap where it is None, or too short
+        for the bus [s].
         """
         session = self._require_session()
         if self._mode is not None:

@@ -30,11 +30,7 @@ def read_bus(
     bauds: tuple[int, int],
     device: str,
 ) -> BusConfiguration[_Servo]:
-    """Bus and servos of an arm.
-
-    Raises DriverError ``refused`` where a key is missing, unknown or not usable; names the joint and the key.
-    `keys`: of a joint's block, that of its ID first; `bauds`: lowest and highest rate [bit/s]; `device`: as an example.
-    """
+    """Bus and servos of an arm. Raises DriverError ``refused``: names joint and key. `keys`: that of the ID first."""
     require_known_keys(joints, ("port", "baud"), keys)
     servos = tuple(read_servo(joint) for joint in joints)
     require_distinct(joints, keys[0])

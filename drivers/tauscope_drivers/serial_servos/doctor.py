@@ -68,11 +68,7 @@ def scan_bauds(
     list_servos: Callable[[_Bus], list[tuple[int, str, str]]],
     slack_s: float,
 ) -> Iterator[FoundDevice]:
-    """Every servo that answers a ping to all, one baud rate after the other; about a second each.
-
-    Raises DriverError ``cannot-connect`` where the port is missing, not permitted or taken.
-    `bauds`: [bit/s]; `list_servos`: ID, model and firmware of each.
-    """
+    """Who answers a ping to all at each of `bauds`; about a second each. Raises DriverError ``cannot-connect``."""
     for baud in bauds:
         port = SerialPort(path, baud, slack_s)
         port.open()

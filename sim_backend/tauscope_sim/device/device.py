@@ -128,11 +128,7 @@ class SimulatedDevice:
         self._fed_ns = self._sample_ns
 
     def command(self, setpoint: Setpoint, sent_ns: int | None = None) -> None:
-        """Take the host's setpoint, and feed the watchdog; drives that stopped by a fault do not follow it.
-
-        Raises DriverError: ``not-enabled`` or ``refused``.
-        `sent_ns`: when it was sent, by the device's clock; None for now [ns].
-        """
+        """Take a setpoint, feed the watchdog. Raises DriverError ``not-enabled``, ``refused``. `sent_ns`: None: now."""
         if self._enabling is None:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the arm is not enabled; enable it before sending setpoints")
         require_finite(setpoint, self.capabilities.joint_count)

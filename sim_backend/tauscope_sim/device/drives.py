@@ -123,13 +123,7 @@ class Drives:
         return self._servo.track(error, error_rate, forward, motion.position)
 
     def overrun(self, motion: Motion) -> tuple[FaultCode, int, str] | None:
-        """What takes the arm beyond its limits in torque control, where no target keeps it within them.
-
-        A joint that could not be stopped any more within its range counts as outside already.
-
-        Returns tuple of FaultCode, int and str, or None: the fault, the joint's number counted from 1, and what
-        happened.
-        """
+        """What takes the arm beyond its limits in torque control; who cannot be stopped in time counts, too."""
         speed = np.abs(motion.velocity)
         if (speed > self._fastest).any():
             column = int(np.argmax(speed - self._fastest))

@@ -51,14 +51,9 @@ class Sample(NamedTuple):
 class Mechanism:
     """Plant and sensors; an instant has one reading, however often it is asked for.
 
-    Position and torque are what `Scenario.sensors` makes of them. Velocity is the drive's estimate: exact where the
-    encoder is, else with white noise as large as the encoder's error times `VELOCITY_BANDWIDTH`.
-
-    `start_position`: (n,), where the arm stands; None is `resting_posture` [rad or m].
-    `tick_s`: time between two ticks [s].
-
-    Raises RobotFileError where the robot file lacks what a simulation needs.
-    Raises ScenarioError where the scenario does not fit the arm.
+    Position and torque are what `Scenario.sensors` makes of them; the encoder's error gives velocity noise, by
+    `VELOCITY_BANDWIDTH`. `start_position`: (n,), None: `resting_posture` [rad or m]; `tick_s`: between ticks [s].
+    Raises RobotFileError, ScenarioError: no simulation of this arm.
     """
 
     def __init__(self, robot: Robot, scenario: Scenario, start_position: ArrayLike | None, tick_s: float) -> None:
@@ -87,12 +82,10 @@ class Mechanism:
         return self._reading
 
     def move(self, torque: Array, tick: int) -> None:
-        """Take the reading of a tick, then let the arm move until the next.
+        """Take the reading of a tick, its torque the mean of before and after it, then let the arm move until the next.
 
-        The torque of a reading is the mean of those before and after the tick, which belongs to the tick's own instant.
-        Raises ScenarioError where the motion grows beyond all bounds; the arm is at rest then.
-
-        `torque`: (n,), of the drives from this tick on [Nm or N].
+        Raises ScenarioError beyond all bounds; the arm is at rest then. `torque`: (n,), of the drives from now on [Nm
+        or N].
         """
         self._take(0.5 * (self._torque + torque), tick)
         self._torque = torque

@@ -171,17 +171,11 @@ def catching_up_acceleration(robot: Robot) -> Array:
 
 
 class Target:
-    """Position, velocity and feed-forward torque of the target.
+    """Position, velocity and feed-forward torque of the target, which stays within range and speed limit.
 
-    It stays within the range and below the speed limit, whatever the host asks.
-
-    Setpoints that move within the limits are followed exactly. One that leaps is approached with bounded acceleration.
-
-    `position`: (n,), where it begins [rad or m].
-    `velocity`: (n,), how it moves there; zero for an arm at rest [rad/s or m/s].
-    `acceleration`: (n,), with which it catches up with setpoints that leapt [rad/s² or m/s²].
-    `tick_s`: time between two ticks [s].
-    `period`: time between setpoints, where the host has told it [ticks].
+    Setpoints within the limits are followed exactly; one that leaps is approached with `acceleration` [rad/s² or m/s²].
+    `position`, `velocity`: (n,), where it begins and how [rad or m, and per s]; `tick_s`: of a tick [s]; `period`: of
+    setpoints, where it is told [ticks].
     """
 
     def __init__(

@@ -76,9 +76,8 @@ def start_device(
 ) -> DeviceProcess:
     """Start a simulated arm in real time, in a session of its own: signals to the caller's group do not reach it.
 
-    Raises DriverError ``cannot-connect`` where the process did not start, with its own message.
-    `start_position`: where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m];
-    `linger_s`: how long the process goes on without a host [s].
+    Raises DriverError ``cannot-connect`` with the process's message. `start_position`: None: `resting_posture`;
+    `linger_s`: without a host [s].
     """
     socket, trace, log = folder / "device.sock", folder / "device.csv", folder / "device.log"
     if len(os.fsencode(socket)) > _LONGEST_SOCKET_PATH:
@@ -130,10 +129,8 @@ _PATIENCE_S = 2.0
 class RemoteSimulatedArm:
     """A backend that reaches the device process over its Unix socket; see `tauscope_sim.driver.start_device`.
 
-    The device keeps its own watchdog: it stops the arm when this process is killed, stopped or cut off. A reply that
-    does not come in time leaves not-a-number in the state of that cycle; `ArmState.enabled` is then as last known.
-
-    `reply_timeout_s`: how long one cycle waits for its reply [s].
+    The device stops the arm when this process is killed, stopped or cut off. Without a reply within `reply_timeout_s`
+    [s] the state of a cycle is not-a-number, and `ArmState.enabled` as last known.
     """
 
     def __init__(self, path: Path, joint_count: int, *, reply_timeout_s: float = 0.02) -> None:

@@ -31,14 +31,10 @@ class VirtualClock:
 
 
 class SimulatedArm:
-    """A backend whose clock carries the device forward; see `tauscope_sim.device.SimulatedDevice` for what that does.
+    """A backend whose clock carries the device forward, which keeps its place and faults while disconnected.
 
-    The device lives as long as this object: it keeps its place, its stop and its faults while disconnected.
-
-    `start_position`: (n,), where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m].
-
-    Raises RobotFileError where the robot file lacks what a simulation needs.
-    Raises ScenarioError where the scenario does not fit the arm.
+    `start_position`: (n,), None: `tauscope_sim.device.mechanism.resting_posture` [rad or m]. Raises as
+    `SimulatedDevice` does.
     """
 
     def __init__(

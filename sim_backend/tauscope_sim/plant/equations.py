@@ -124,13 +124,9 @@ class StaticFriction(Term):
 class EquationsOfMotion:
     """Accelerations and rates of the plant, and their linearisation.
 
-    A rigid joint has one coordinate and obeys the equation of `tauscope_sim.plant.term`. A compliant one has two, link
-    and motor, with the transmission's torque T between them:
-
-        H(q) q̈ + h + c + link = T,      J θ̈ + friction + motor + T (1 + g) + |T| f = u.
-
-    Raises RobotFileError where the robot file lacks what the simulation needs.
-    Raises ScenarioError where effects contradict one another.
+    A rigid joint obeys the equation of `tauscope_sim.plant.term`; a compliant one has two coordinates, link and motor,
+    with T between them: H(q) q̈ + h + c + link = T, J θ̈ + friction + motor + T (1 + g) + |T| f = u. Raises
+    RobotFileError, ScenarioError where robot or effects do not fit.
     """
 
     def __init__(self, robot: Robot, effects: Sequence[PhysicalEffect]) -> None:

@@ -19,11 +19,7 @@ SETTLED = 1e-13  # change of a link's position that ends the iteration [rad or m
 
 
 def settled(equations: EquationsOfMotion, motor_position: Array) -> Array:
-    """State of an arm at rest with q_j = θ_j - twist_j(load_j(q)), found by iteration.
-
-    Raises ScenarioError where a transmission is too soft to carry its link.
-    `motor_position`: (n,), θ [rad or m]. Returns (2N + m,), y: positions, zero velocities, the effects' initial states.
-    """
+    """An arm at rest, (2N + m,): q_j = θ_j - twist_j(load_j(q)). Raises ScenarioError. `motor_position`: θ, (n,)."""
     compliant = list(equations.coordinates.compliant)
     position = np.concatenate([motor_position, motor_position[compliant]])
     vector = np.concatenate([position, np.zeros_like(position), equations.initial_states()])
@@ -75,14 +71,10 @@ class PlantState:
 class Plant:
     """Forward physics of an arm: rigid bodies, the robot file's static friction, and concealed effects.
 
-    Steps are at most `step_s` long. Where friction reverses, teeth meet or a bristle turns, a step is divided until its
-    estimated error is below `TOLERANCE` × (step_s / `STEP`)²: halving `step_s` halves every sub-step, and the result
-    converges with the square of `step_s`. No step crosses an instant at which an effect begins or ends.
-
-    `step_s`: longest step of the integration [s].
-
-    Raises RobotFileError where the robot file lacks what the simulation needs.
-    Raises ScenarioError where effects contradict one another or the robot.
+    Steps are at most `step_s` [s]. Where friction reverses, teeth meet or a bristle turns, a step is divided until its
+    estimated error is below `TOLERANCE` × (step_s / `STEP`)²: the result converges with the square of `step_s`. None
+    crosses an instant at which an effect begins or ends. Raises RobotFileError, ScenarioError where robot or effects do
+    not fit.
     """
 
     def __init__(self, robot: Robot, effects: Sequence[PhysicalEffect] = (), *, step_s: float = STEP) -> None:
@@ -122,11 +114,7 @@ class Plant:
         )
 
     def place(self, position: ArrayLike) -> None:
-        """Start afresh at time zero: motors at rest in a place, compliant links hanging still, effects as when new.
-
-        Raises ScenarioError where that is no place, or a transmission is too soft to carry its link.
-        `position`: (n,), of the motors, in joint units [rad or m].
-        """
+        """Start afresh at rest. Raises ScenarioError: no such place, or too soft. `position`: (n,), of the motors."""
         motors = np.asarray(position, dtype=np.float64)
         if motors.shape != (self.joint_count,) or not np.all(np.isfinite(motors)):
             raise ScenarioError(f"position {motors} is not one finite number for each of {self.joint_count} joints")

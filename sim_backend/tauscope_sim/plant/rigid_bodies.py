@@ -72,11 +72,7 @@ class RigidBodies:
         return jacobian @ self._ratios if self._is_coupled else jacobian
 
     def carry(self, carrier: object, payload: Array | None) -> None:
-        """Change what the last link carries; it takes the payload over at its own speed, without an impact.
-
-        `payload`: (10,), standard parameters in the last link's frame, in the order of
-        `tauscope.robot.robot.STANDARD_PARAMETERS`; None drops it.
-        """
+        """Change what the last link carries, without impact. `payload`: (10,), `STANDARD_PARAMETERS`; None drops it."""
         self._carried.pop(id(carrier), None)
         if payload is not None:
             self._carried[id(carrier)] = payload

@@ -78,11 +78,7 @@ def _section_name(given: str) -> str | None:
 
 
 def parse_number(text: str, node_id: int | None = None) -> int | None:
-    """A whole number as files write it; None where it is none.
-
-    Decimal, ``0x`` hexadecimal, octal by a leading zero (CiA 306), hexadecimal digits without ``0x``, and ``$NODEID``
-    alone or added to one of these.
-    """
+    """A whole number as files write it (CiA 306): decimal, hexadecimal also without 0x, octal, ``$NODEID``."""
     number = text.replace(" ", "").upper()
     if "$NODEID" in number:
         if node_id is None:
