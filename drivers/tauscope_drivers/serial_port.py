@@ -89,16 +89,13 @@ class SerialPort:
     def _claim(self, baud: int) -> None:
         """Open the device, lock it, and ask its driver for low latency."""
         self.ser = serial.Serial(self.path, baud, timeout=0, exclusive=True)
-        if not self._is_pseudo_terminal():
+        status = os.fstat(self._require_open().fileno())
+        if not (stat.S_ISCHR(status.st_mode) and os.major(status.st_rdev) in _PSEUDO_TERMINALS):
             # The flag of a pseudo terminal would outlive a killed owner, for its emulator keeps it open.
             fcntl.ioctl(self.ser.fileno(), termios.TIOCEXCL)
             with contextlib.suppress(OSError, ValueError, serial.SerialException):
                 self.ser.set_low_latency_mode(True)
         self.ser.reset_input_buffer()
-
-    def _is_pseudo_terminal(self) -> bool:
-        status = os.fstat(self._require_open().fileno())
-        return stat.S_ISCHR(status.st_mode) and os.major(status.st_rdev) in _PSEUDO_TERMINALS
 
     def _require_open(self) -> serial.Serial:
         if self.ser is None:

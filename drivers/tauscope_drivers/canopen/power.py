@@ -96,7 +96,8 @@ def stop_in_cycle(session: Session, mode: ControlMode, goal: Goal) -> bool:
 
     def is_nothing_left_to_wait_for() -> bool:
         are_stopped = all(has_stopped(node, goal) or node.is_deaf for node in session.nodes)
-        return are_stopped and (session.has_braked or not any(node.holds_by_targets for node in session.nodes))
+        has_braked = session.brake is None or session.brake.is_at_rest(session.clock.now_ns())
+        return are_stopped and (has_braked or not any(node.holds_by_targets for node in session.nodes))
 
     def cycle() -> ArmState:
         return session.cycle(mode, goal, session.stop_targets(), session.unhurried_ns)

@@ -113,11 +113,6 @@ class Session:
             if state is not DriveState.OPERATION_ENABLED:
                 self.bus.command_nodes(NMT_PRE_OPERATIONAL, node.configuration.node_id)
 
-    @property
-    def has_braked(self) -> bool:
-        """Whether the targets of `stop_targets` have come to rest."""
-        return self.brake is None or self.brake.is_at_rest(self.clock.now_ns())
-
     def stop_targets(self) -> Setpoint:
         """Targets of a stop: they bring drives to rest that stop by targets; others do not follow them."""
         now_ns = self.clock.now_ns()

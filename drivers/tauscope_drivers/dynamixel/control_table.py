@@ -168,12 +168,6 @@ class ServoModel:
         return "Present Current" in self.items and "Goal Current" in self.items
 
     @property
-    def paces_goals(self) -> bool:
-        """Whether Profile Velocity and Goal Position are neighbours, so that one write carries both."""
-        speed = self.items["Profile Velocity"]
-        return speed.address + speed.size == self.items["Goal Position"].address
-
-    @property
     def temperature_item(self) -> Item:
         """Temperature of the motor, or the only one it has."""
         return self.items.get("Present Motor Temperature") or self.items["Present Temperature"]

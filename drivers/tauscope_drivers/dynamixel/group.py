@@ -172,7 +172,8 @@ def paced_goals(
     for _, members in servo_families(servos):
         model = servos[members[0]].model
         goal, speed = model.items["Goal Position"], model.items["Profile Velocity"]
-        if model.paces_goals:
+        speed, goal = model.items["Profile Velocity"], model.items["Goal Position"]
+        if speed.address + speed.size == goal.address:  # one write carries both
             yield [speed, goal], {servos[index].servo: [speeds[index], goals[index]] for index in members}
         else:
             yield [goal], {servos[index].servo: [goals[index]] for index in members}

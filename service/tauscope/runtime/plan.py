@@ -105,7 +105,9 @@ def make_plan(
         robot, low, high, speed, following=options.following_error, temperature_c=options.temperature_c
     )
     _require_within(limits, robot, start, low, high, speed)
-    way = _ramp(robot, np.clip(start, limits.position_low, limits.position_high), trajectory, rate_hz)
+    begin = np.clip(start, limits.position_low, limits.position_high)
+    way = ramp(begin, trajectory.start, motion_limits(robot))
+    way = MoveSegment(way.start, way.end, float(np.ceil(way.duration_s * rate_hz)) / rate_hz)
     ramp_cycles = round(way.duration_s * rate_hz)
     moved = way.evaluate(np.arange(ramp_cycles) / rate_hz)
     pause = round(options.settle_s * rate_hz)
@@ -138,11 +140,6 @@ def _require_fitting(robot: Robot, trajectory: Trajectory, start: Array, capabil
     silent = [joint.name for joint, position in zip(robot.joints, start, strict=True) if not np.isfinite(position)]
     if silent:
         raise AcquisitionError(f"{silent[0]}: does not say where it stands; check its cable and its drive")
-
-
-def _ramp(robot: Robot, start: Array, trajectory: Trajectory, rate_hz: float) -> MoveSegment:
-    way = ramp(start, trajectory.start, motion_limits(robot))
-    return MoveSegment(way.start, way.end, float(np.ceil(way.duration_s * rate_hz)) / rate_hz)
 
 
 def _require_within(limits: GuardLimits, robot: Robot, start: Array, low: Array, high: Array, speed: Array) -> None:

@@ -180,10 +180,8 @@ class RunProcess:
         return self._record
 
     def _put_stop_file(self) -> None:
-        try:
+        with suppress(OSError):
             (self.folder / records.STOP_FILE).touch()
-        except OSError:
-            return
 
     def _send(self, byte: bytes) -> None:
         """Write to the control process; a full pipe means that it is stopped itself, and its device stops the arm."""

@@ -93,7 +93,7 @@ def test_a_model_waits_for_its_campaign_and_is_judged_by_its_diagnosis(
     (folder / "result.json").write_bytes(content)
     made = CampaignLinks(identification=identifier, diagnosis=diagnoses.publish(folder))
     folder, record = campaigns.stage(), JobRecord(state=JobState.RUNNING, created=NOON)
-    CampaignWorkspace(folder).write_made(made)
+    CampaignWorkspace(folder).record_made(**dict(made))
     CampaignWorkspace(folder).write_record(record)
     campaign = CampaignWorkspace(campaigns.folder(campaigns.publish(folder)))
     judged: list[Candidate] = []

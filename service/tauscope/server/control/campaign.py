@@ -73,8 +73,8 @@ class CampaignWorkspace(Workspace[CampaignOrder]):
     def read_made(self) -> CampaignLinks:
         return read_stored(self._made, CampaignLinks) or CampaignLinks()
 
-    def write_made(self, made: CampaignLinks) -> None:
-        write_stored(self._made, made)
+    def record_made(self, **made: object) -> None:
+        write_stored(self._made, self.read_made().model_copy(update=made))
 
 
 _log = logging.getLogger("tauscope.jobs")
@@ -174,7 +174,7 @@ class CampaignRunner:
                 self._wait("excitation", held_out)
                 self._begin("run the held-out motion")
                 judges = (self._run_motion(held_out, "held_out_run"),)
-            self._record(recordings=recordings, held_out=judges)
+            self._workspace.record_made(recordings=recordings, held_out=judges)
         self._release_arm()
         self._begin("identify")
         self._analyse("identification", analyses.IdentificationWorkspace, order.identification)
@@ -185,7 +185,7 @@ class CampaignRunner:
     def _design(self, options: ExcitationDesignOptions, link: str) -> str:
         order = analyses.ExcitationOrder(**self._robot, options=options)
         identifier = self._submit(analyses.ExcitationWorkspace, order)
-        self._record(**{link: identifier})
+        self._workspace.record_made(**{link: identifier})
         return identifier
 
     def _submit(self, workspace: type[TaskWorkspace[Order]], order: Order) -> str:
@@ -222,7 +222,7 @@ class CampaignRunner:
             take_trajectory(design, staged)
             staged.write_order(request)
             self._run_identifier = dependencies.runs.submit(staged.folder, ready_motion, self.holder, self._permit)
-        self._record(**{link: self._run_identifier})
+        self._workspace.record_made(**{link: self._run_identifier})
         if self._stop_requested.is_set():
             dependencies.runs.stop(self._run_identifier)
         self._follow(self._run_identifier)
@@ -249,7 +249,7 @@ class CampaignRunner:
             order_type: type[Any] = workspace.order_type
             order = order_type(**self._robot, **self._recordings(), options=options)
             identifier = self._submit(workspace, order)
-        self._record(**{link: identifier})
+        self._workspace.record_made(**{link: identifier})
         self._wait(link, identifier)
 
     def _recordings(self) -> dict[str, Any]:
@@ -274,9 +274,6 @@ class CampaignRunner:
         if self._stop_requested.is_set():
             raise StoppedError
         self._workspace.write_step(step)
-
-    def _record(self, **made: object) -> None:
-        self._workspace.write_made(self._workspace.read_made().model_copy(update=made))
 
     def _cancel_jobs(self) -> None:
         made, dependencies = self._workspace.read_made(), self._dependencies

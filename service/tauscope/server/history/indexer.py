@@ -177,7 +177,10 @@ class Indexer:
                 self._known = {kind: self.index.stamps(kind) for kind in self._items}
             for kind, store in self._items.items():
                 self._sync_kind(kind, store, thorough=thorough)
-            self._sync_recordings()
+            recordings = self._recordings.entries()
+            if recordings != self._seen_recordings:
+                self.index.put_recordings(recordings)
+                self._seen_recordings = recordings
             self._is_whole = not self._is_closing.is_set()
 
     def close(self) -> None:
@@ -260,12 +263,6 @@ class Indexer:
         """Index items in one transaction: to wait for the disk once each would take hours for a large folder."""
         self.index.put(found)
         self._known[kind] |= {facts.identifier: (facts.stamp, facts.is_final) for facts in found}
-
-    def _sync_recordings(self) -> None:
-        entries = self._recordings.entries()
-        if entries != self._seen_recordings:
-            self.index.put_recordings(entries)
-            self._seen_recordings = entries
 
 
 def open_index(index: Index, items: Mapping[str, ItemStore], recordings: RecordingStore, label: str) -> Indexer:
