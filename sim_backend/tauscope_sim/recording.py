@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauscope.errors import RecordingError
-from tauscope.robot.robot import Array, FrictionCoefficients, FrictionShape, Joint, Robot
+from tauscope.robot.robot import Array, Joint, Robot
 from tauscope_sim.friction import static_friction_torque
 from tauscope_sim.model import build_model
 from tauscope_sim.motion import FourierMotion, MotionSamples
@@ -57,15 +57,12 @@ def simulate_recording(
     rng: np.random.Generator,
     position_noise_std: ArrayLike = 0.0,
     encoder_step: ArrayLike = 0.0,
-    friction: Sequence[FrictionCoefficients] | None = None,
-    friction_shape: Sequence[FrictionShape] | None = None,
 ) -> SimulatedRecording:
     """Record an arm that follows a motion exactly: τ = H(q) q̈ + h(q, q̇) + c(q) + τ_f(q̇) + noise, equations (1), (6).
 
     The noise is Gaussian, white, independent, as in the paper's section 3. `rate_hz`: a whole number of samples a
-    period; `noise_std`, `position_noise_std`, `encoder_step`: (n,) or one for all [Nm or N; rad or m];
-    `friction_shape`: K_v and δ of each joint; None: the robot file's. Raises RobotFileError, RecordingError where there
-    is no such recording.
+    period; `noise_std`, `position_noise_std`, `encoder_step`: (n,) or one for all [Nm or N; rad or m]. Raises
+    RobotFileError, RecordingError where there is no such recording.
     """
     samples_per_period = _samples_per_period(motion.period_s, rate_hz)
     if periods < 1:
@@ -77,7 +74,7 @@ def simulate_recording(
     step = _per_joint(encoder_step, robot, "encoder_step")
 
     one_period = motion.evaluate(np.arange(samples_per_period) / rate_hz)
-    torque = _torque(robot, one_period, friction, friction_shape)
+    torque = _torque(robot, one_period)
     exact = MotionSamples(
         position=np.tile(one_period.position, (periods, 1)),
         velocity=np.tile(one_period.velocity, (periods, 1)),
@@ -117,22 +114,16 @@ def _per_joint(value: ArrayLike, robot: Robot, name: str) -> Array:
     return np.broadcast_to(array, (robot.joint_count,))
 
 
-def _torque(
-    robot: Robot,
-    samples: MotionSamples,
-    friction: Sequence[FrictionCoefficients] | None,
-    friction_shape: Sequence[FrictionShape] | None,
-) -> Array:
+def _torque(robot: Robot, samples: MotionSamples) -> Array:
     ratios, offsets = robot.ratios, np.array([coupling.offset for coupling in robot.couplings])
     position, velocity, acceleration = (
         each @ ratios.T for each in (samples.position, samples.velocity, samples.acceleration)
     )
     torque = rigid_body_torque(build_model(robot), position + offsets, velocity, acceleration) @ ratios
-    friction = friction if friction is not None else robot.model.friction
-    if friction is None:
+    if robot.model.friction is None:
         return torque
-    shape = friction_shape if friction_shape is not None else [joint.friction_shape for joint in robot.joints]
-    return torque + static_friction_torque(samples.velocity, friction, shape)
+    shape = [joint.friction_shape for joint in robot.joints]
+    return torque + static_friction_torque(samples.velocity, robot.model.friction, shape)
 
 
 def _quantise(position: Array, step: Array) -> Array:

@@ -33,7 +33,7 @@ def test_exact_torque_is_rigid_body_plus_friction(paper: Robot) -> None:
 
 
 def test_friction_can_be_replaced(paper: Robot) -> None:
-    plain = record(paper, friction=[FrictionCoefficients()] * 3)
+    plain = record(replace(paper, model=replace(paper.model, friction=(FrictionCoefficients(),) * 3)))
     viscous = record(paper, friction=[FrictionCoefficients(viscous=1.0)] * 3)
     np.testing.assert_allclose(viscous.torque_exact - plain.torque_exact, plain.exact.velocity, atol=1e-12)
     unstated = replace(paper, model=replace(paper.model, friction=None))
