@@ -25,7 +25,7 @@ class SerialServoArm(ABC, Generic[_Session]):
     def __init__(self, configuration: BusConfiguration[Any], slack_s: float, clock: Clock | None) -> None:
         """Nothing is opened yet. `slack_s`: how much longer than the bus takes an answer is waited for [s]."""
         self._configuration = configuration
-        self._clock = MonotonicClock() if clock is None else clock
+        self.clock = MonotonicClock() if clock is None else clock
         self._port = SerialPort(configuration.port, configuration.baud, slack_s)
         self._session: _Session | None = None
         self._mode: ControlMode | None = None
@@ -39,11 +39,6 @@ class SerialServoArm(ABC, Generic[_Session]):
     @abstractmethod
     def capabilities(self) -> Capabilities:
         """What these servos can do; the rate is exact once they are reached."""
-
-    @property
-    def clock(self) -> Clock:
-        """The machine's monotonic clock, where no other was given."""
-        return self._clock
 
     def require_rate(self, rate_hz: float) -> None:
         """Refuse a rate that the bus does not carry. Raises DriverError ``refused``, which names what limits it."""
@@ -93,7 +88,7 @@ class SerialServoArm(ABC, Generic[_Session]):
             _require_none(self._read_faults(session))
             self._pace = self._take_under_power(session, mode, limits, watchdog_s, cycle_s)
         self._mode, self._policy, self._watchdog_s = mode, stop_policy, watchdog_s
-        self._last_exchange_ns = self._clock.now_ns()
+        self._last_exchange_ns = self.clock.now_ns()
         return self._observe(session, is_health_fresh=True)
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
@@ -104,7 +99,7 @@ class SerialServoArm(ABC, Generic[_Session]):
         require_finite(setpoint, len(self._configuration.servos))
         with self._watching_the_port():
             state = self._cycle(session, self._mode, setpoint)
-        self._last_exchange_ns = self._clock.now_ns()
+        self._last_exchange_ns = self.clock.now_ns()
         return state
 
     def stop(self, policy: StopPolicy) -> ArmState:
@@ -177,7 +172,7 @@ class SerialServoArm(ABC, Generic[_Session]):
             return self._read_state(session, is_health_fresh=is_health_fresh)
 
     def _blind(self) -> ArmState:
-        return ArmState.unknown(self._clock.now_ns(), len(self._configuration.servos), self._lost)
+        return ArmState.unknown(self.clock.now_ns(), len(self._configuration.servos), self._lost)
 
     def _require_session(self) -> _Session:
         if self._session is None:

@@ -136,7 +136,8 @@ class RunProcess:
                     env=records.child_environment(),
                     bufsize=0,
                 )
-            records.write_process(folder, self._process.pid)
+            self.pid = self._process.pid
+            records.write_process(folder, self.pid)
         except OSError as error:
             raise AcquisitionError(f"{folder}: the run cannot be started ({error.strerror or error})") from error
         assert self._process.stdin is not None  # noqa: S101 - asked for above
@@ -148,10 +149,6 @@ class RunProcess:
         self._has_ended, self._stop_asked = threading.Event(), threading.Event()
         self._watcher = threading.Thread(target=self._watch, name=f"run {folder.name}", daemon=True)
         self._watcher.start()
-
-    @property
-    def pid(self) -> int:
-        return self._process.pid
 
     @property
     def has_ended(self) -> bool:

@@ -20,7 +20,6 @@ from tauscope.robot import Robot, robot_to_dict
 from tauscope_drivers import (
     ArmState,
     Capabilities,
-    Clock,
     ControlMode,
     DriveLimits,
     DriverError,
@@ -135,7 +134,7 @@ class RemoteSimulatedArm:
 
     def __init__(self, path: Path, joint_count: int, *, reply_timeout_s: float = 0.02) -> None:
         self._path, self._count, self._reply_timeout_s = path, joint_count, reply_timeout_s
-        self._clock = MonotonicClock()
+        self.clock = MonotonicClock()
         self._socket: socket.socket | None = None
         self._buffer = messages.FrameBuffer()
         self._sequence = 0
@@ -145,11 +144,6 @@ class RemoteSimulatedArm:
     def capabilities(self) -> Capabilities:
         """What it can do."""
         return list_capabilities(self._count, LARGEST_RATE_HZ)
-
-    @property
-    def clock(self) -> Clock:
-        """The machine's monotonic clock, which is the device's too."""
-        return self._clock
 
     def connect(self) -> ArmState:
         """Reach the device and read it. Raises DriverError ``cannot-connect``: missing, taken, or of other joints."""
@@ -198,7 +192,7 @@ class RemoteSimulatedArm:
     def exchange(self, setpoint: Setpoint) -> ArmState:
         """Write the setpoints, read the arm; see `drivers.Backend`."""
         require_finite(setpoint, self._count)
-        body = messages.encode_setpoint(self._clock.now_ns(), setpoint)
+        body = messages.encode_setpoint(self.clock.now_ns(), setpoint)
         try:
             reply = self._request(messages.FrameKind.EXCHANGE, body, self._reply_timeout_s)
         except TimeoutError:
@@ -288,7 +282,7 @@ class RemoteSimulatedArm:
 
     def _miss(self) -> ArmState:
         nothing = np.full(self._count, np.nan)
-        return ArmState(self._clock.now_ns(), nothing, nothing, nothing, nothing, self._enabled)
+        return ArmState(self.clock.now_ns(), nothing, nothing, nothing, nothing, self._enabled)
 
     def _lose(self, reason: str) -> DriverError:
         self._close()

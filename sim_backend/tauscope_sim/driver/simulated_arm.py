@@ -5,7 +5,7 @@ from collections.abc import Callable
 from numpy.typing import ArrayLike
 
 from tauscope.robot.robot import Robot
-from tauscope_drivers import ArmState, Capabilities, Clock, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
+from tauscope_drivers import ArmState, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_sim.device import SimulatedDevice
 from tauscope_sim.scenario import Scenario
@@ -43,18 +43,9 @@ class SimulatedArm:
         kept = Scenario() if scenario is None else scenario
         self.device = SimulatedDevice(robot, kept, start_position=start_position)
         """the drives and the arm, for tests and demonstrations"""
-        self._clock = VirtualClock(self.device.time_ns, self.device.advance_to)
+        self.capabilities = self.device.capabilities
+        self.clock = VirtualClock(self.device.time_ns, self.device.advance_to)
         self._connected = False
-
-    @property
-    def capabilities(self) -> Capabilities:
-        """What it can do."""
-        return self.device.capabilities
-
-    @property
-    def clock(self) -> Clock:
-        """Virtual time."""
-        return self._clock
 
     def connect(self) -> ArmState:
         """Reach the device and read it. Raises DriverError: ``cannot-connect`` where it is connected already."""
@@ -86,7 +77,7 @@ class SimulatedArm:
     def exchange(self, setpoint: Setpoint) -> ArmState:
         """Write the setpoints, read the arm; see `drivers.Backend`."""
         self._require_connection()
-        self.device.command(setpoint, self._clock.now_ns())
+        self.device.command(setpoint, self.clock.now_ns())
         return self.device.read()
 
     def stop(self, policy: StopPolicy) -> ArmState:

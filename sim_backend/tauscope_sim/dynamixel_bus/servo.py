@@ -118,7 +118,7 @@ class EmulatedServo:
     }
 
     def __init__(self, specification: control_memory.ServoSpecification, *, seed: int = 0) -> None:
-        self.specification = specification
+        self.specification, self.servo = specification, specification.servo
         self.memory = control_memory.ControlMemory(specification)
         self.encoder_offset_counts = 0
         self._loop = ServoLoop(specification, self.memory)
@@ -128,11 +128,6 @@ class EmulatedServo:
         self._heard_s = 0.0
         self._motion: tuple[float, float] | None = None
         self._seen: deque[tuple[float, float, float]] = deque(maxlen=_FILTERED_STEPS + 1)
-
-    @property
-    def servo(self) -> int:
-        """ID."""
-        return self.specification.servo
 
     @property
     def secondary(self) -> int | None:

@@ -82,6 +82,7 @@ class Plant:
             raise ScenarioError(f"step_s is {step_s}; give a positive duration")
         self._equations = EquationsOfMotion(robot, effects)
         self._coordinates = self._equations.coordinates
+        self.joint_count = robot.joint_count
         self._motors = self._coordinates.motors
         self._step = RosenbrockStep(self._equations)
         self._longest = step_s
@@ -89,11 +90,6 @@ class Plant:
         self._shortest = SHORTEST_PART * step_s
         self._part = step_s
         self.place(np.zeros(robot.joint_count))
-
-    @property
-    def joint_count(self) -> int:
-        """Number of joints n."""
-        return self._coordinates.joint_count
 
     @property
     def motor_motion(self) -> tuple[Array, Array]:
