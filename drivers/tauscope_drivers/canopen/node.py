@@ -10,14 +10,7 @@ from tauscope_drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, MASTER_NODE
 from tauscope_drivers.canopen.configuration import NodeConfiguration
 from tauscope_drivers.canopen.data_sheet.needs import needs_guarding, pdo_slots, present_objects, require_identity
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST, decode_emergency, describe_error
-from tauscope_drivers.canopen.objects import (
-    STAYING_OPTIONS,
-    SUBSTITUTES,
-    TARGETS,
-    DriveObject,
-    describe_absent,
-    select_modes,
-)
+from tauscope_drivers.canopen.objects import SUBSTITUTES, TARGETS, DriveObject
 from tauscope_drivers.canopen.sdo import NodeDictionary
 from tauscope_drivers.canopen.state_machine import ENABLE_OPERATION, DriveState, Goal, decode_state, next_controlword
 from tauscope_drivers.canopen.units import DriveUnits, drive_units, read_rated_torque
@@ -157,10 +150,10 @@ class DriveNode:
         self._find_watchdog()
         found = (entry for entry in SUBSTITUTES if self.dictionary.read_optional(entry) is not None)
         self.present = frozenset(found) & (frozenset(SUBSTITUTES) if file is None else present_objects(file))
-        self.remarks = (*([objects.GUARDED] if self.is_guarded else []), *describe_absent(self.present))
-        self.stays_stopped = self.dictionary.read_optional(objects.QUICK_STOP_OPTION) in STAYING_OPTIONS
+        self.remarks = (*([objects.GUARDED] if self.is_guarded else []), *objects.describe_absent(self.present))
+        self.stays_stopped = self.dictionary.read_optional(objects.QUICK_STOP_OPTION) in objects.STAYING_OPTIONS
         self.units = self._learn_units()
-        self.mode_numbers = select_modes(self.dictionary.read(objects.SUPPORTED_MODES))
+        self.mode_numbers = objects.select_modes(self.dictionary.read(objects.SUPPORTED_MODES))
         if not self.has(objects.VELOCITY_ACTUAL):
             self.mode_numbers.pop(ControlMode.TORQUE, None)
         if self.mode_numbers.get(ControlMode.POSITION) == objects.INTERPOLATED_POSITION:

@@ -75,10 +75,7 @@ def encode_sync_write(values: Mapping[int, bytes], address: int) -> bytes:
 class FeetechParser(FrameParser):
     """Finds whole frames in what comes from a port."""
 
-    header, fixed_bytes = HEADER, _FIXED_BYTES
-
-    def __init__(self, longest: int = LONGEST_FRAME) -> None:
-        super().__init__(longest)
+    header, fixed_bytes, longest = HEADER, _FIXED_BYTES, LONGEST_FRAME
 
     @override
     def find_end(self, start: bytearray) -> int | None:

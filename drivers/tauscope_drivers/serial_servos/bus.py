@@ -95,11 +95,12 @@ class FrameParser(ABC):
 
     header: bytes
     fixed_bytes: int  # bytes from which a frame's end is known
+    longest: int  # frames that say to be longer are noise [bytes]
 
-    def __init__(self, longest: int) -> None:
+    def __init__(self, longest: int | None = None) -> None:
         """Begin with nothing. `longest`: longest frame that is believed: a damaged length swallows no more [bytes]."""
         self.discarded = 0
-        self.longest = longest
+        self.longest = longest or self.longest
         self._buffer = bytearray()
 
     @abstractmethod

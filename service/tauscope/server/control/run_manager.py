@@ -175,8 +175,7 @@ class RunSupervisor:
         self._permit.disarm()
         self._halt()
 
-    def interrupt(self) -> None:
-        self.stop()
+    interrupt = stop
 
     def _halt(self) -> None:
         self._stop_requested.set()
