@@ -14,9 +14,8 @@ from tauscope.server.auth.gate import find_caller
 from tauscope.server.auth.keys import Scope
 from tauscope.server.control.leases import LONGEST_TTL_S, Lease, LeaseLostError, Permit
 from tauscope.server.http.answers import ROOT, AnswerModel
-from tauscope.server.http.bodies import read_document
-from tauscope.server.http.openapi import json_request
-from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.openapi import takes_document
+from tauscope.server.http.services import Services, ServicesDep, document_of
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.run import BackendChoice
@@ -100,16 +99,19 @@ NO_BODY = {"requestBody": {"required": False, "content": {}}}
     status_code=201,
     summary="Take the lease of an arm",
     response_model=LeaseAnswer,
-    responses=problem_responses("bad-request", "limit-exceeded", "media-type", "leased", "busy"),
-    openapi_extra=json_request(LeaseRequest, EXAMPLES),
+    **takes_document(LeaseRequest, EXAMPLES, "leased", "busy"),
 )
-async def take_lease(request: Request, response: Response, services: ServicesDep) -> LeaseAnswer:
+async def take_lease(
+    wanted: Annotated[LeaseRequest, document_of(LeaseRequest)],
+    request: Request,
+    response: Response,
+    services: ServicesDep,
+) -> LeaseAnswer:
     """Exclusive: nobody else moves the arm while the lease holds. It ends by itself unless heartbeats renew it.
 
     Whatever moves by a lease stops when the lease ends. A service without API keys moves an arm without a lease too, as
     long as nobody has one; with keys, motion needs a lease that is armed.
     """
-    wanted = await read_document(request, LeaseRequest, services.settings.max_document_bytes)
     caller = find_caller(request.scope)
     if wanted.take and not caller.scope.includes(Scope.ADMIN):
         raise ProblemError("forbidden", f"taking an arm needs a key of scope admin; the one of {caller.name} has less")

@@ -13,6 +13,7 @@ from typing import Annotated, Any, cast
 
 from anyio import CapacityLimiter
 from fastapi import Depends, Request
+from pydantic import BaseModel
 
 from tauscope.errors import NotFoundError, TauscopeError
 from tauscope.server.auth.audit_log import AuditLog, AuditTrail
@@ -26,6 +27,7 @@ from tauscope.server.history.indexer import Indexer, open_index
 from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.history.model_registry import DriftMonitor, ModelRegistry
 from tauscope.server.history.retention import RetentionRule, sweep
+from tauscope.server.http.bodies import read_document
 from tauscope.server.http.metrics import Metrics, ModelDrift, TimedExecutor
 from tauscope.server.http.readiness import Clock, Heartbeat, Readiness, check_database, check_disk
 from tauscope.server.http.reading import WIDTH, ReadingQueue
@@ -75,6 +77,11 @@ class Services:
     feeds: EventFeeds
     followers: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(4))
 
+    def judge_new(self) -> None:
+        """Judge every identification: one that ended a moment ago may become the active model."""
+        self.index.refresh()
+        self.models.judge_new()
+
     def begin_to_close(self) -> None:
         """Stop every arm, and let go of whoever follows events; returns at once."""
         self.closing.set()
@@ -88,6 +95,17 @@ async def _services_of(request: Request) -> Services:
 
 
 ServicesDep = Annotated[Services, Depends(_services_of)]  # the services, as an argument of a route
+
+
+def document_of(kind: type[BaseModel]) -> Any:
+    """The JSON body of a request, as an argument of a route: the framework would read one of any size."""
+
+    async def read(request: Request, services: ServicesDep) -> BaseModel:
+        return await read_document(request, kind, services.settings.max_document_bytes)
+
+    return Depends(read)
+
+
 PRUNING_S = 3600.0  # how often what is old is removed, where the operator asked for it [s]
 DAY_S = 86400.0
 REQUESTS_PER_S = 200.0  # how often a key may call in the long run, where the operator says nothing [1/s]
@@ -302,19 +320,19 @@ def require_data_folder(settings: Settings) -> None:
 
 
 def require_no_model(services: Services, identifier: str) -> None:
-    _judge_new(services)
+    services.judge_new()
     _require_free(services, identifier, {identifier})
 
 
 def require_no_evidence(services: Services, recording: str) -> None:
     """Raises ProblemError if an active model or a reference was made from or judged by a recording."""
-    _judge_new(services)
+    services.judge_new()
     _require_free(services, recording, services.index.index.list_users(recording))
 
 
 def require_no_identification(services: Services, version: str) -> None:
     """Raises ProblemError if an active model or a reference was identified with a robot."""
-    _judge_new(services)
+    services.judge_new()
     users = set()
     for identifier in services.models.history.list_protected():
         with suppress(NotFoundError):  # of another service
@@ -323,12 +341,6 @@ def require_no_identification(services: Services, version: str) -> None:
             if order is not None and hash_robot(workspace.robot, order.robot_file) == version:
                 users.add(identifier)
     _require_free(services, version, users)
-
-
-def _judge_new(services: Services) -> None:
-    """Judge every identification: one that ended a moment ago may become the active model."""
-    services.index.refresh()
-    services.models.judge_new()
 
 
 def _require_free(services: Services, name: str, users: Collection[str]) -> None:
