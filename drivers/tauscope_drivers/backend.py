@@ -34,10 +34,7 @@ class StopPolicy(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class DriveLimits:
-    """What the drives themselves enforce, set before torque is switched on; infinite where there is no limit.
-
-    `position_low`, `position_high`: (n,), range of the joint [rad or m].
-    """
+    """What the drives enforce, set before they have torque; infinite: none. `position_low`, `position_high`: (n,)."""
 
     position_low: Array
     position_high: Array
@@ -49,9 +46,8 @@ class DriveLimits:
 class Capabilities:
     """What a backend can do, known without motion.
 
-    `policies_by_mode`: ways to stop that the device carries out itself in each mode, where they differ; None where
-        every mode has all.
-    `remarks`: what the drives do not have, and what is done in place of it; known once the arm is connected.
+    `policies_by_mode`: what the device does itself in each mode; None: all; `remarks`: what drives lack, known once
+    connected.
     """
 
     joint_count: int
@@ -85,17 +81,11 @@ class Backend(Protocol):
         ...
 
     def connect(self) -> ArmState:
-        """Reach every drive and read it; moves nothing and switches no torque on.
-
-        Raises DriverError ``cannot-connect`` where a device is missing, taken or of the wrong kind.
-        """
+        """Reach and read every drive; moves nothing. Raises DriverError ``cannot-connect``: missing or wrong."""
         ...
 
     def acknowledge_faults(self) -> ArmState:
-        """Clear the faults that the drives have latched, on the operator's word; moves nothing.
-
-        Raises DriverError: ``not-connected``, or ``fault`` where a fault stays.
-        """
+        """Clear latched faults on the operator's word; moves none. Raises DriverError ``not-connected``, ``fault``."""
         ...
 
     def enable(
@@ -130,4 +120,3 @@ class Backend(Protocol):
 
     def disconnect(self) -> None:
         """Let go of the bus; an arm that is still enabled is stopped by its own policy first."""
-        ...

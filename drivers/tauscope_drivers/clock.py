@@ -20,10 +20,7 @@ class AnswerTime:
         return round(median(self._taken_ns)) if self._taken_ns else 0
 
     def late_ns(self, taken_ns: int) -> int:
-        """How much later than usual an answer came [ns].
-
-        `taken_ns`: from the question to the last byte or frame of the answer [ns].
-        """
+        """How much later than usual an answer came [ns]. `taken_ns`: from the question to the answer's end [ns]."""
         self._taken_ns.append(taken_ns)
         return max(0, taken_ns - self.usual_ns)
 

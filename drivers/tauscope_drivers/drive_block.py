@@ -31,11 +31,7 @@ class DriveJoint:
 
 
 def require_known_keys(joints: Sequence[DriveJoint], bus_keys: Sequence[str], own_keys: Sequence[str]) -> None:
-    """Refuse keys that nobody knows, and several buses.
-
-    Raises DriverError ``refused``, which names the joint and the key.
-    `joints`: base first; what they say of the bus stands on the first.
-    """
+    """Refuse unknown keys, and a joint that names another bus than the first. Raises DriverError ``refused``."""
     first = joints[0]
     known = sorted({*bus_keys, *own_keys, *_KEYS_OF_ANY_BUS})
     for joint in joints:
@@ -56,11 +52,7 @@ def require_distinct(joints: Sequence[DriveJoint], key: str) -> None:
 
 
 def read_whole(joint: DriveJoint, key: str, default: int | None, *, least: int, most: int) -> int:
-    """A whole number.
-
-    Raises DriverError ``refused`` where it is none, or out of range.
-    `default`: where the key is missing; None where it has to be there.
-    """
+    """A whole number, `default` where the key is missing. Raises DriverError ``refused``: none, or out of range."""
     value = joint.drive.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
         raise refusal(joint, key, f"= {value!r}; give a whole number from {least} to {most}")
@@ -68,10 +60,7 @@ def read_whole(joint: DriveJoint, key: str, default: int | None, *, least: int, 
 
 
 def read_direction(joint: DriveJoint) -> int:
-    """Which way a drive turns: -1 where it is against the joint, else 1.
-
-    Raises DriverError ``refused`` where another number.
-    """
+    """Which way a drive turns: 1, or -1 against the joint. Raises DriverError ``refused`` where another number."""
     direction = read_whole(joint, "direction", 1, least=-1, most=1)
     if direction == 0:
         raise refusal(joint, "direction", "= 0; give 1 or -1")

@@ -65,10 +65,7 @@ class Driver(ABC):
 
     @abstractmethod
     def make_backend(self, arm: ArmDescription, settings: Mapping[str, Any]) -> Connection:
-        """The arm as a backend, not connected yet; the settings have no other names than those of `options`.
-
-        Raises DriverError: ``refused``: a ``drive`` block or a setting is not valid.
-        """
+        """The arm as a backend, not connected yet. Raises DriverError ``refused``: a block or setting is invalid."""
 
 
 class BusDriver(Driver):
@@ -102,25 +99,15 @@ class BusDriver(Driver):
         return []
 
     def examine(self, joints: Sequence[DriveJoint]) -> list[Finding]:
-        """Adapter and every drive that the robot file names.
-
-        Raises DriverError: ``refused``: a ``drive`` block is not valid.
-        """
+        """Adapter and every drive that the robot file names. Raises DriverError ``refused``: a block is not valid."""
         return self.load("doctor").examine(joints)
 
     def scan(self, port: str, bit_rates: Sequence[int] | None) -> Iterator[FoundDevice]:
-        """Devices that answer, whoever they belong to.
-
-        Raises DriverError where the port is missing, not permitted or taken.
-        `bit_rates`: to try [bit/s]; the usual ones where None.
-        """
+        """Devices that answer. Raises DriverError: no such port, or taken. `bit_rates`: None: the usual [bit/s]."""
         return self.load("doctor").scan_bus(port, bit_rates)
 
     def plan_frames(self, joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:
-        """The frames of a run, without a port.
-
-        Raises DriverError: ``refused``: a ``drive`` block or a limit is not possible.
-        """
+        """The frames of a run, without a port. Raises DriverError ``refused``: a block or a limit is not possible."""
         return self.load("dry_run").plan_frames(joints, request)
 
     def load(self, module: str) -> Any:
@@ -128,10 +115,7 @@ class BusDriver(Driver):
         return import_module(f".{module}", type(self).__module__.rpartition(".")[0])
 
     def read_patience_s(self, settings: Mapping[str, Any]) -> float:
-        """How much longer than it takes an answer is waited for [s].
-
-        Raises DriverError ``refused`` where it is no time up to a second.
-        """
+        """How much longer an answer is waited for [s]. Raises DriverError ``refused`` beyond a second."""
         patience_s = settings.get(PATIENCE.name, PATIENCE.default)
         is_number = isinstance(patience_s, int | float) and not isinstance(patience_s, bool)
         if not (is_number and 0.0 < patience_s <= _LONGEST_PATIENCE_S):

@@ -38,10 +38,7 @@ class GoalPace:
     def __init__(
         self, servos: Sequence[PacedServo], goals: Sequence[int], caps: Sequence[int], cycle_s: float, now_ns: int
     ) -> None:
-        """Begin with servos that hold their goals.
-
-        `goals`: of each servo [counts]; `caps`: largest speed of each, 0 for none [units].
-        """
+        """Begin with servos that hold `goals` [counts]. `caps`: largest speed of each, 0 for none [units]."""
         self._counts_per_second = [servo.counts_per_speed_unit for servo in servos]
         self._goals = list(goals)
         self._targets = [float(goal) for goal in goals]
@@ -54,7 +51,9 @@ class GoalPace:
     def speeds(self, goals: Sequence[int], now_ns: int) -> list[int]:
         """Speed of each servo towards its next goal [units]. `goals`: of each servo [counts]."""
         elapsed_s, self._now_ns = (now_ns - self._now_ns) * 1e-9, now_ns
-        left_s = self._time_left_s(now_ns)
+        self._grid.cycles_until(now_ns)
+        late_s = self._grid.late_ns(now_ns) * 1e-9
+        left_s = max(_AHEAD_CYCLES * self._cycle_s - late_s, _LEAST_CYCLES * self._cycle_s)
         for joint, unit in enumerate(self._counts_per_second):
             reach = self._speeds[joint] * unit * elapsed_s
             self._targets[joint] += min(reach, max(-reach, self._goals[joint] - self._targets[joint]))
@@ -64,8 +63,3 @@ class GoalPace:
             self._speeds[joint] = int(min(cap, math.ceil(max(wanted, least))))
         self._goals = list(goals)
         return list(self._speeds)
-
-    def _time_left_s(self, now_ns: int) -> float:
-        self._grid.cycles_until(now_ns)
-        late_s = self._grid.late_ns(now_ns) * 1e-9
-        return max(_AHEAD_CYCLES * self._cycle_s - late_s, _LEAST_CYCLES * self._cycle_s)

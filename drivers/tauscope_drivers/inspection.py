@@ -39,10 +39,7 @@ class FoundDevice:
 
 @dataclass(frozen=True, eq=False)
 class FrameRequest:
-    """The run whose frames are asked for.
-
-    `targets`: (K, n), positions of the first K cycles; the arm stands at the first of them [rad or m].
-    """
+    """The run whose frames are asked for. `targets`: (K, n), of K cycles; the arm stands at the first [rad or m]."""
 
     mode: ControlMode
     limits: DriveLimits

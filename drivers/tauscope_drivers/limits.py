@@ -32,11 +32,7 @@ def stated_limits(joints: Sequence[DriveJoint]) -> DriveLimits:
 
 
 def require_sensible(limits: DriveLimits, position: Array, labels: Sequence[str]) -> None:
-    """Refuse limits that leave no motion, are no numbers, or are those of another place.
-
-    Raises DriverError ``refused``, which names the joint and the limit.
-    `position`: (n,), where the arm stands [rad or m].
-    """
+    """Refuse limits that leave no motion from `position`, (n,) [rad or m]. Raises DriverError ``refused``."""
     joint_count = len(position)
     for name in ("position_low", "position_high", "velocity", "torque"):
         if np.shape(getattr(limits, name)) != (joint_count,):
@@ -71,10 +67,7 @@ class RunawayWatch:
         self._fast = np.zeros(len(limits.velocity), dtype=np.int64)
 
     def look(self, position: Array, velocity: Array) -> Fault | None:
-        """The first joint that leaves its limits; NaN leaves none.
-
-        `position`: (n,) [rad or m]; `velocity`: (n,) [rad/s or m/s].
-        """
+        """The first joint that leaves its limits; not NaN. `position`, `velocity`: (n,) [rad or m, and per s]."""
         limits = self._limits
         with np.errstate(invalid="ignore"):
             ahead = position + CATCH_S * velocity
@@ -96,18 +89,12 @@ class TorqueWatch:
     """Looks at the measured torque of joints whose drives have no torque limit of their own."""
 
     def __init__(self, torque: Array) -> None:
-        """Begin with a sound arm.
-
-        `torque`: (n,), largest torque; infinite where the drive limits it, or where there is no limit [Nm or N].
-        """
+        """Begin with a sound arm. `torque`: (n,), largest; infinite where the drive limits it itself [Nm or N]."""
         self._torque = torque
         self._over = np.zeros(len(torque), dtype=np.int64)
 
     def look(self, effort: Array) -> Fault | None:
-        """The first joint beyond its limit for `PERSISTENCE` cycles; NaN is none.
-
-        `effort`: (n,), measured torque [Nm or N].
-        """
+        """The first joint beyond its limit for `PERSISTENCE` cycles; NaN is none. `effort`: (n,) [Nm or N]."""
         with np.errstate(invalid="ignore"):
             over = np.abs(effort) > TORQUE_MARGIN * self._torque
         self._over = np.where(over, self._over + 1, 0)

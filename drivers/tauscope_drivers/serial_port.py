@@ -37,10 +37,7 @@ class SerialPort:
         self._slack_s = slack_s
 
     def open(self) -> None:
-        """Open the port and lock it against everybody else.
-
-        Raises DriverError ``cannot-connect`` where it is not there, not permitted, or taken; names the holder.
-        """
+        """Open the port and lock it. Raises DriverError ``cannot-connect``: missing, not permitted, or who has it."""
         self.close()
         try:
             self._claim(self.baudrate)
@@ -92,16 +89,13 @@ class SerialPort:
     def _claim(self, baud: int) -> None:
         """Open the device, lock it, and ask its driver for low latency."""
         self.ser = serial.Serial(self.path, baud, timeout=0, exclusive=True)
-        if not self._is_pseudo_terminal():
+        status = os.fstat(self._require_open().fileno())
+        if not (stat.S_ISCHR(status.st_mode) and os.major(status.st_rdev) in _PSEUDO_TERMINALS):
             # The flag of a pseudo terminal would outlive a killed owner, for its emulator keeps it open.
             fcntl.ioctl(self.ser.fileno(), termios.TIOCEXCL)
             with contextlib.suppress(OSError, ValueError, serial.SerialException):
                 self.ser.set_low_latency_mode(True)
         self.ser.reset_input_buffer()
-
-    def _is_pseudo_terminal(self) -> bool:
-        status = os.fstat(self._require_open().fileno())
-        return stat.S_ISCHR(status.st_mode) and os.major(status.st_rdev) in _PSEUDO_TERMINALS
 
     def _require_open(self) -> serial.Serial:
         if self.ser is None:
@@ -143,10 +137,7 @@ def expect_latency_s(path: str) -> float:
 
 
 def find_holder(path: str) -> str | None:
-    """The process that has a port open, as ``process 123 (name)``; None where none is seen.
-
-    Processes of other users show their open files only to the superuser.
-    """
+    """Who has a port open, as ``process 123 (name)``; None where none is seen: others' processes show no files."""
     try:
         wanted = os.stat(path).st_rdev
     except OSError:

@@ -12,14 +12,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ArmState:
-    """What the arm's drives measured in one cycle, in joint units.
+    """What the arm's drives measured in one cycle, in joint units; NaN, never the value before, where none came.
 
-    A value that was not received in this cycle is NaN, never the one before.
-
-    `effort`: (n,), measured effort as `Capabilities.effort_unit` says: joint torque [Nm or N], or what the drive
-        reports instead.
-    `late_ns`: how much later than the bus takes the answers came: the instant of the reading is not known any better
-        [ns].
+    `effort`: (n,), as `Capabilities.effort_unit` says. `late_ns`: how much later than the bus takes the answers came:
+    the instant is not known any better [ns].
     """
 
     time_ns: int  # instant of the reading by the backend's clock [ns]

@@ -14,11 +14,7 @@ from tauscope_sim.recording import simulate_recording, write_recording_csv
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Simulate a recording and write it.
-
-    Returns int: exit status: 0 done, 1 the robot file or the output file does not allow it (2, wrong usage, exits by
-    itself).
-    """
+    """Simulate a recording and write it; the exit status: 0 done, 1 a file does not allow it (2: wrong usage)."""
     options = _parser().parse_args(arguments)
     try:
         rows = _simulate(options)

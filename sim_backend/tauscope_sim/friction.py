@@ -14,12 +14,9 @@ def static_friction_torque(
 ) -> Array:
     """Friction torque τ_f = τ_s S₀(v) + τ_sc (2/π) arctan(v δ) + τ_v v, with S₀(v) = (2/π) arctan(v K_v).
 
-    Raises RobotFileError where a shape constant that is needed is None, or where the number of entries is not the
-    number of joints.
-
-    `velocity`: (N, n), v = q̇ [rad/s or m/s]; `friction_shape`: K_v and δ, one entry a joint [s/rad or s/m]; may be None
-    where the coefficient that it shapes is zero. Returns τ_f, (N, n), positive where the drive has to overcome it in
-    the positive direction [Nm or N]. The paper's equations (7) and (8); its (7) prints the viscous part without v.
+    Positive where the drive has to overcome it, (N, n) [Nm or N]; `velocity`: (N, n), v = q̇. The paper's (7) and (8);
+    its (7) prints the viscous part without v. `friction_shape`: K_v and δ of each joint [s/rad or s/m], None where not
+    needed. Raises RobotFileError where one that is needed is None.
     """
     joint_count = velocity.shape[1]
     if len(friction) != joint_count or len(friction_shape) != joint_count:
@@ -40,11 +37,7 @@ def static_friction_torque(
 def shape_constants(
     friction: Sequence[FrictionCoefficients], friction_shape: Sequence[FrictionShape]
 ) -> list[tuple[float, float]]:
-    """K_v and δ of each joint; zero where the coefficient that they shape is zero and the robot file states none.
-
-    Raises RobotFileError where a shape constant that is needed is None.
-    `friction_shape`: K_v and δ, one entry a joint [s/rad or s/m].
-    """
+    """K_v and δ of each joint; zero where not needed. Raises RobotFileError where a needed one is None."""
     constants: list[tuple[float, float]] = []
     for number, (coefficients, shape) in enumerate(zip(friction, friction_shape, strict=True), 1):
         place = f"joint {number}: friction_shape"
@@ -60,10 +53,7 @@ def _require(slope: float | None, level: float, place: str) -> float:
 
 
 def smooth_sign(velocity: float, k_v: float) -> float:
-    """A(v) = (2/π) arctan(K_v v), the continuous stand-in for sgn v, equation (8).
-
-    `velocity`: v [rad/s or m/s]; `k_v`: K_v [s/rad or s/m].
-    """
+    """A(v) = (2/π) arctan(K_v v), a continuous sgn v, equation (8). v [rad/s or m/s]; K_v [s/rad or s/m]."""
     return math.atan(k_v * velocity) / (0.5 * math.pi)
 
 

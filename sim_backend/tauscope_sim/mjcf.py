@@ -41,9 +41,8 @@ def read_chain(
 ) -> Chain:
     """The chain from body `base` to body `tip`; by default from the root to the deepest body.
 
-    Raises RobotFileError if MuJoCo refuses the file, or no chain of hinges and slides runs from base to tip.
-    `path`: where the file lies, for the files that it names; None for text without files beside it; `locked`: position
-    of joints that do not move [rad or m].
+    Raises RobotFileError without such a chain. `path`: of the file, None for text alone; `locked`: position of joints
+    that rest.
     """
     return _Reader(_compile(data, label, path), label, locked).chain(base, tip)
 
@@ -374,11 +373,7 @@ def _rotation(quaternion: Array) -> Array:
 
 
 def _compile(data: bytes, label: str, path: Path | None) -> mujoco.MjModel:
-    """The compiled model; where files of shapes or textures are missing, without the shapes that carry no mass.
-
-    Raises RobotFileError if MuJoCo refuses the file.
-    `path`: where the file lies, for the files that it names; None for text without files beside it.
-    """
+    """The compiled model, without shapes whose files are missing. Raises RobotFileError. `path`: of the file."""
     try:
         with warnings.catch_warnings(action="ignore"):  # attributes that MuJoCo will remove one day
             with suppress(ValueError):

@@ -56,10 +56,7 @@ def build_spec(robot: Robot) -> mujoco.MjSpec:
 
 
 def build_model(robot: Robot) -> mujoco.MjModel:
-    """Compiled MuJoCo model of an arm; see `build_spec`.
-
-    Raises RobotFileError where the robot file states no links, or where MuJoCo refuses the model.
-    """
+    """Compiled model of an arm; see `build_spec`. Raises RobotFileError: no links, or MuJoCo refuses the model."""
     spec = build_spec(robot)
     with _mujoco_refusals(robot):
         return spec.compile()

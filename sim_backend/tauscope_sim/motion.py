@@ -13,10 +13,7 @@ LEAST_HARMONICS = 2  # one harmonic alone cannot be at rest, with zero accelerat
 
 @dataclass(frozen=True, eq=False)
 class MotionSamples:
-    """A motion at given instants.
-
-    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈ [rad or m, and per s, per s²].
-    """
+    """A motion at given instants: q, q̇, q̈, each (N, n) [rad or m, and per s, per s²]."""
 
     position: Array
     velocity: Array
@@ -52,13 +49,10 @@ def random_fourier_motion(
     harmonics: int = 5,
     limit_fraction: float = 0.95,
 ) -> FourierMotion:
-    """Random finite Fourier series, each joint scaled until the first of its limits is reached.
+    """Random finite Fourier series, each joint scaled until the first of its limits is reached, at every instant.
 
-    Velocity and acceleration are zero at the start and the end of the period: Σ a_l = 0 and Σ l b_l = 0. The limits
-    hold at every instant, not only at samples. A limit that is not stated does not bind. Raises RobotFileError where a
-    joint states no limit. Raises RecordingError where `period_s`, `harmonics` or `limit_fraction` is out of its range.
-
-    `period_s`: duration of one period [s].
+    Velocity and acceleration are zero at both ends of the period of `period_s` [s]: Σ a_l = 0 and Σ l b_l = 0. Raises
+    RobotFileError where a joint states no limit, RecordingError for an argument out of its range.
     """
     if not (np.isfinite(period_s) and period_s > 0.0):
         raise RecordingError(f"period_s is {period_s}; give a positive duration")

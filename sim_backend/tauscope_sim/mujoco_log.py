@@ -25,17 +25,10 @@ _GROUPS = ("q", "tau", "qd", "qref")
 
 
 class MujocoLog:
-    """Steps a simulation and keeps time, position, velocity, actuator torque and commands of its joints.
-
-    The rows of one step are the state before it and the torque that acts in it.
-    """
+    """Steps a simulation and keeps its joints' state before each step, the torque in it, and commands."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, joints: Sequence[str] | None = None) -> None:
-        """Take a simulation; nothing of it is changed.
-
-        Raises RecordingError where a joint is not there, or is no hinge or slide.
-        `joints`: hinges and slides, base first; None: all of them, as the file has them.
-        """
+        """Take a simulation's `joints`, base first; None: all. Raises RecordingError: missing, or no hinge or slide."""
         every = [model.joint(index).name for index in range(model.njnt) if model.jnt_type[index] in HINGE_OR_SLIDE]
         self.joints = tuple(every if joints is None else joints)
         for name in self.joints:
@@ -49,10 +42,7 @@ class MujocoLog:
         self._rows: list[NDArray[np.float64]] = []
 
     def step(self, command: NDArray[np.float64] | None = None) -> None:
-        """Do what ``mujoco.mj_step(model, data)`` does, and keep a row.
-
-        `command`: (n,), that is kept as ``qref``; None: the actuators' control.
-        """
+        """``mujoco.mj_step(model, data)``, keeping a row. `command`: (n,), kept as ``qref``; None: the actuators'."""
         data = self._data
         time, position, velocity = data.time, data.qpos[self._qpos].copy(), data.qvel[self._dof].copy()
         if command is None:
@@ -61,10 +51,7 @@ class MujocoLog:
         self._rows.append(np.concatenate([[time], position, data.qfrc_actuator[self._dof], velocity, command]))
 
     def save(self, path: str | Path, *, with_torque: bool = True) -> None:
-        """Write all rows as CSV.
-
-        `with_torque`: whether torque is among the columns; a position servo's log has none.
-        """
+        """Write all rows as CSV. `with_torque`: whether torque is a column; a position servo's log has none."""
         rows, count = np.array(self._rows), len(self.joints)
         groups = [group for group in _GROUPS if with_torque or group != "tau"]
         places = [_GROUPS.index(group) for group in groups]

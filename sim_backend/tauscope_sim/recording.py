@@ -13,17 +13,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauscope.errors import RecordingError
-from tauscope.robot.robot import Array, FrictionCoefficients, FrictionShape, Joint, Robot
+from tauscope.robot.robot import Array, Joint, Robot
 from tauscope_sim.friction import static_friction_torque
 from tauscope_sim.model import build_model
 from tauscope_sim.motion import FourierMotion, MotionSamples
 
 
 def rigid_body_torque(model: mujoco.MjModel, position: Array, velocity: Array, acceleration: Array) -> Array:
-    """Joint torque τ = H(q) q̈ + h(q, q̇) + c(q) along a motion, by ``mj_inverse``.
+    """Joint torque τ = H(q) q̈ + h(q, q̇) + c(q), (N, n) [Nm or N], along a motion, by ``mj_inverse``: equation (1).
 
-    `position`: (N, n), q [rad or m]; `velocity`: (N, n), q̇ [rad/s or m/s]; `acceleration`: (N, n), q̈ [rad/s² or
-    m/s²]. Returns (N, n), τ without friction, the paper's equation (1) [Nm or N].
+    `position`, `velocity`, `acceleration`: (N, n), q, q̇, q̈ [rad or m, and per s, per s²].
     """
     data = mujoco.MjData(model)
     torque = np.empty_like(position)
@@ -58,20 +57,12 @@ def simulate_recording(
     rng: np.random.Generator,
     position_noise_std: ArrayLike = 0.0,
     encoder_step: ArrayLike = 0.0,
-    friction: Sequence[FrictionCoefficients] | None = None,
-    friction_shape: Sequence[FrictionShape] | None = None,
 ) -> SimulatedRecording:
     """Record an arm that follows a motion exactly: τ = H(q) q̈ + h(q, q̇) + c(q) + τ_f(q̇) + noise, equations (1), (6).
 
-    The noise is Gaussian, white, of zero mean, and independent between joints, as in the paper's section 3. Raises
-    RobotFileError where the robot file lacks what the simulation needs. Raises RecordingError where the settings make
-    no recording.
-
-    `rate_hz`: samples per second; each period has to hold a whole number of samples [Hz].
-    `noise_std`: (n,) or float, standard deviation of the torque noise [Nm or N].
-    `position_noise_std`: (n,) or float, standard deviation of the position noise [rad or m].
-    `encoder_step`: (n,) or float, resolution to which positions are rounded, zero for none [rad or m].
-    `friction_shape`: K_v and δ of each joint [s/rad or s/m]; the robot file's where None.
+    The noise is Gaussian, white, independent, as in the paper's section 3. `rate_hz`: a whole number of samples a
+    period; `noise_std`, `position_noise_std`, `encoder_step`: (n,) or one for all [Nm or N; rad or m]. Raises
+    RobotFileError, RecordingError where there is no such recording.
     """
     samples_per_period = _samples_per_period(motion.period_s, rate_hz)
     if periods < 1:
@@ -83,7 +74,7 @@ def simulate_recording(
     step = _per_joint(encoder_step, robot, "encoder_step")
 
     one_period = motion.evaluate(np.arange(samples_per_period) / rate_hz)
-    torque = _torque(robot, one_period, friction, friction_shape)
+    torque = _torque(robot, one_period)
     exact = MotionSamples(
         position=np.tile(one_period.position, (periods, 1)),
         velocity=np.tile(one_period.velocity, (periods, 1)),
@@ -123,22 +114,16 @@ def _per_joint(value: ArrayLike, robot: Robot, name: str) -> Array:
     return np.broadcast_to(array, (robot.joint_count,))
 
 
-def _torque(
-    robot: Robot,
-    samples: MotionSamples,
-    friction: Sequence[FrictionCoefficients] | None,
-    friction_shape: Sequence[FrictionShape] | None,
-) -> Array:
+def _torque(robot: Robot, samples: MotionSamples) -> Array:
     ratios, offsets = robot.ratios, np.array([coupling.offset for coupling in robot.couplings])
     position, velocity, acceleration = (
         each @ ratios.T for each in (samples.position, samples.velocity, samples.acceleration)
     )
     torque = rigid_body_torque(build_model(robot), position + offsets, velocity, acceleration) @ ratios
-    friction = friction if friction is not None else robot.model.friction
-    if friction is None:
+    if robot.model.friction is None:
         return torque
-    shape = friction_shape if friction_shape is not None else [joint.friction_shape for joint in robot.joints]
-    return torque + static_friction_torque(samples.velocity, friction, shape)
+    shape = [joint.friction_shape for joint in robot.joints]
+    return torque + static_friction_torque(samples.velocity, robot.model.friction, shape)
 
 
 def _quantise(position: Array, step: Array) -> Array:
@@ -151,11 +136,10 @@ def _quantise(position: Array, step: Array) -> Array:
 def write_recording_csv(
     path: Path, recording: SimulatedRecording, joints: Sequence[Joint], *, as_current: bool = False
 ) -> None:
-    """Write what a real arm's logger would have written, the joints' wiring included.
+    """Write what a real arm's logger would have written, the joints' wiring included, to the last digit.
 
-    A joint with ``sign: -1`` is recorded the other way round; with `as_current` the columns are i1…in and hold torque
-    divided by the joint's torque constant. Numbers are written so that reading them gives the same float64. Raises
-    RecordingError where the file exists, or cannot be written.
+    With `as_current` the columns are i1…in, torque by the torque constant. Raises RecordingError where the file cannot
+    be made.
     """
     signs = np.array([joint.sign for joint in joints], dtype=np.float64)
     constants = np.array([joint.torque_constant for joint in joints])

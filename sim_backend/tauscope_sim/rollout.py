@@ -14,17 +14,10 @@ JOINT_EQUALITY = int(mujoco.mjtEq.mjEQ_JOINT)
 
 
 class MujocoPlant:
-    """A compiled MJCF of which torque and dry friction are given at every step.
-
-    Joint limits are off: the real arm kept within them, and an error must not be hidden by a stop.
-    """
+    """A compiled MJCF with torque and dry friction at every step, without joint limits, which would hide an error."""
 
     def __init__(self, mjcf: str, joints: Sequence[str], step_s: float, damping: Array) -> None:
-        """Compile the file.
-
-        `joints`: names of the driven joints, base first; `step_s`: [s]; `damping`: (n,), added to that of the file [Nm
-        s/rad or N s/m].
-        """
+        """Compile the file. `joints`: base first; `step_s`: [s]; `damping`: (n,), added [Nm s/rad or N s/m]."""
         model = mujoco.MjModel.from_xml_string(mjcf)
         model.opt.timestep = step_s
         model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -56,11 +49,7 @@ class MujocoPlant:
         mujoco.mj_forward(model, data)
 
     def advance(self, torque: Array, dry: Array) -> None:
-        """One step.
-
-        `torque`: (n,), on the joints [Nm or N]; `dry`: (n,), dry friction, which holds a joint at rest up to this level
-        [Nm or N].
-        """
+        """One step. `torque`: (n,), on the joints [Nm or N]; `dry`: (n,), friction that holds one at rest [Nm or N]."""
         self._data.qfrc_applied[self._dof] = torque
         self._model.dof_frictionloss[self._dof] = dry
         mujoco.mj_step(self._model, self._data)

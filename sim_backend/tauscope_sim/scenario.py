@@ -31,12 +31,7 @@ class Scenario:
     seed: int = 0
 
     def plant(self, robot: Robot, *, step_s: float = STEP) -> Plant:
-        """Forward physics of the arm with its concealed effects.
-
-        Raises RobotFileError where the robot file lacks what the simulation needs. Raises ScenarioError where effects
-        contradict one another or the robot.
-        `step_s`: longest step of the integration [s].
-        """
+        """Forward physics with the concealed effects; raises as `Plant` does. `step_s`: longest step [s]."""
         for effect in self.effects:
             effect.check(robot)
         return Plant(robot, self.effects, step_s=step_s)
@@ -62,11 +57,7 @@ class Sensors:
         self._rng = rng
 
     def measure(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        """Position and torque as recorded of one instant, each (n,); instants come in order, at the recording's rate.
-
-        `time`: of the sample [s]; `position`: (n,), true, of the encoder's side [rad or m]; `torque`: (n,), true, of
-        the drive, on the joint's side of the gear [Nm or N].
-        """
+        """What is recorded at `time` [s] of true `position` [rad or m] and `torque` [Nm or N], (n,), in order."""
         for channel in self._channels:
             position, torque = channel.pass_on(time, position, torque)
         noise = self._rng.standard_normal((2, len(position)))

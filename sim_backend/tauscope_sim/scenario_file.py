@@ -46,12 +46,10 @@ class ScenarioDocument(Document):
     effects: list[Any] = Field(default_factory=list, max_length=MOST_EFFECTS)
 
 
-def read_scenario(path: Path | str, robot: Robot) -> Scenario:
-    """The scenario of a file.
-
-    Raises ScenarioError if the file cannot be read, is not valid or does not fit the robot; one line naming file, entry
-    and key.
-    """
+def read_scenario(path: Path | str | None, robot: Robot) -> Scenario:
+    """The scenario of a file; None conceals nothing. Raises ScenarioError: one line, names file, entry and key."""
+    if path is None:
+        return Scenario()
     try:
         data = read_bounded(Path(path), LARGEST_SCENARIO_FILE)
     except RobotFileError as error:

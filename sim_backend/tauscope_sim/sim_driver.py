@@ -36,7 +36,11 @@ class SimulatedDriver(Driver):
         if pace == "virtual":
             if socket is not None:
                 raise _refusal("a socket belongs to an arm in real time; set time to real, or leave it out")
-            return _virtual_arm(arm, scenario, start)
+            from tauscope_sim.driver import SimulatedArm
+            from tauscope_sim.scenario_file import read_scenario
+
+            simulated = SimulatedArm(arm.robot, read_scenario(scenario, arm.robot), start_position=start)
+            return Connection(simulated, is_real_time=False)
         from tauscope_sim.driver import RemoteSimulatedArm, start_device
 
         if socket is None:
@@ -47,15 +51,6 @@ class SimulatedDriver(Driver):
         elif scenario is not None or start is not None:
             raise _refusal("scenario and start belong to an arm that is started here; leave out socket")
         return Connection(RemoteSimulatedArm(socket, len(arm.joints)), is_real_time=True)
-
-
-def _virtual_arm(arm: ArmDescription, scenario: Path | None, start: list[float] | None) -> Connection:
-    from tauscope_sim.driver import SimulatedArm
-    from tauscope_sim.scenario import Scenario
-    from tauscope_sim.scenario_file import read_scenario
-
-    concealed = Scenario() if scenario is None else read_scenario(scenario, arm.robot)
-    return Connection(SimulatedArm(arm.robot, concealed, start_position=start), is_real_time=False)
 
 
 def _path(settings: Mapping[str, Any], key: str) -> Path | None:

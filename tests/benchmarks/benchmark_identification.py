@@ -87,7 +87,6 @@ def compare(folder: Path, repeats: int) -> dict[str, object]:
         periods=1,
         noise_std=[NOISE_STD] * JOINTS,
         rng=np.random.default_rng(1),
-        friction=None,
     )
     path = folder / "recording.csv"
     write_recording_csv(path, recording, arm.joints)

@@ -46,7 +46,7 @@ def stopped(client: httpx2.Client, runs: Path, number: int, count: int) -> tuple
             raise SystemExit(answer.text)
         ended = followed(client, run)
     workspace = RunWorkspace(runs / run["id"])
-    record = workspace.read_run()
+    record = workspace.read_record()
     if record is None or ended["state"] != RunState.STOPPED:
         raise SystemExit(f"{run['id']}: is {ended['state']}")
     last_ns = int(read_journal(workspace.recording("mcap")).rows["time_ns"][-1])

@@ -8,7 +8,7 @@ from playwright.sync_api import Page, Route, expect
 
 from browser.conftest import Visit
 from server.http.serving import Served
-from tauscope.server.page.example import example_files
+from tauscope.server.page.router import example_files
 
 pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(600)]
 

@@ -29,7 +29,7 @@ class ServoSpecification:
         return self.direction * self.reduction * 4096 / (2.0 * math.pi)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FeetechOrder(ServoOrder[ServoSpecification]):
     """The arm and the clock are those of the other emulated servos."""
 

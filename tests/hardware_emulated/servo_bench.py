@@ -95,7 +95,7 @@ def bench(
         specification = ServoSpecification(1, torque_per_milliampere=TORQUE_PER_UNIT)
         servos = tuple(replace(specification, servo=number) for number in range(1, servos + 1))
     drives = [{"id": servo.servo, "baud": servo.baud} for servo in servos]
-    with _bench(folder, drives, partial(DynamixelOrder, servos, **options), start, DynamixelArm) as one:
+    with _bench(folder, drives, partial(DynamixelOrder, servos=servos, **options), start, DynamixelArm) as one:
         yield one
 
 
@@ -108,14 +108,15 @@ def feetech_bench(folder: Path, *, start: float = 0.2, **options: Any) -> Iterat
         for number in (1, 2, 3)
     )
     drives = [{"servo_id": servo.servo} for servo in servos]
-    with _bench(folder, drives, partial(FeetechOrder, servos, **options), start, FeetechArm) as one:
+    with _bench(folder, drives, partial(FeetechOrder, servos=servos, **options), start, FeetechArm) as one:
         yield one
 
 
 @contextmanager
 def _bench(folder: Path, drives: list[dict[str, Any]], order: Any, start: float, make_arm: Any) -> Iterator[Bench]:
     port = str(folder / "port")
-    asked = order((start,) * len(drives), port, str(folder / "control"), trace=str(folder / "trace"))
+    places, control = (start,) * len(drives), str(folder / "control")
+    asked = order(start=places, port=port, control=control, trace=str(folder / "trace"))
     with EmulatorProcess(asked) as emulator:
         one = Bench(emulator, [{**drive, "port": port} for drive in drives], make_arm)
         try:

@@ -40,7 +40,7 @@ class ServoKind:
         """Emulated servos whose port and control are in a folder."""
         port, control = str(folder / "port"), str(folder / "control")
         servos = self.servos_of(arm, **(self.quick if quick else {}))
-        return self.make_order(servos, tuple(start), port, control, **options)
+        return self.make_order(servos=servos, start=tuple(start), port=port, control=control, **options)
 
 
 def servos_of(robot: Robot, **registers: int) -> tuple[ServoSpecification, ...]:

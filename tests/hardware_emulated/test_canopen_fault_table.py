@@ -26,7 +26,14 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 
     def order(_: Robot, start: tuple[float, ...]) -> CanOrder:
         port, control = str(folder / "port"), str(folder / "control")
-        return CanOrder(str(robot_file), start, port, control, rated_torque_mnm=(1000, 1000, 800), stepped=True)
+        return CanOrder(
+            robot=str(robot_file),
+            start=start,
+            port=port,
+            control=control,
+            rated_torque_mnm=(1000, 1000, 800),
+            stepped=True,
+        )
 
     with fault_site(robot_file, order) as one:
         yield one

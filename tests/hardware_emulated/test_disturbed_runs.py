@@ -48,10 +48,10 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 
     def order(_: Robot, start: tuple[float, ...]) -> CanOrder:
         return CanOrder(
-            str(robot_file),
-            start,
-            f"socketcan:{INTERFACE}",
-            str(folder / "control"),
+            robot=str(robot_file),
+            start=start,
+            port=f"socketcan:{INTERFACE}",
+            control=str(folder / "control"),
             rated_torque_mnm=(1000, 1000, 800),
             trace=str(folder / "trace"),
             stepped=True,

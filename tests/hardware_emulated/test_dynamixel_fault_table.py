@@ -27,7 +27,9 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 
     def order(robot: Robot, start: tuple[float, ...]) -> DynamixelOrder:
         port, control = str(folder / "port"), str(folder / "control")
-        return DynamixelOrder(servos_of(robot), start, port, control, robot=str(robot_file), stepped=True)
+        return DynamixelOrder(
+            servos=servos_of(robot), start=start, port=port, control=control, robot=str(robot_file), stepped=True
+        )
 
     with fault_site(robot_file, order) as one:
         yield one

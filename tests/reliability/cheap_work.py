@@ -3,18 +3,24 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from tauscope.errors import RecordingError, TauscopeError
 from tauscope.files import write_atomically
 from tauscope.server.queue.analyses import IdentificationWorkspace
 from tauscope.server.queue.job_folder import JobProblem, begin_step, do_work
+from tauscope.server.queue.task_job import TaskWorkspace, perform_job
 from tauscope.server.store.files import hash_file
 
 SCHEMA = "tauscope.identification/1"
 
 
-def cheap_identification(folder: Path, server_recordings: Path, fate: Callable[[], None]) -> JobProblem | None:
+def cheap_identification(
+    kind: type[TaskWorkspace[Any]], server_recordings: Path, folder: Path, fate: Callable[[], None]
+) -> JobProblem | None:
     """Write down what the recordings of the order hold; `fate` may have the process killed meanwhile."""
+    if kind is not IdentificationWorkspace:
+        return perform_job(kind, server_recordings, folder)
     fate()
     workspace = IdentificationWorkspace(folder)
 

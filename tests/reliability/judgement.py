@@ -116,7 +116,7 @@ class Judge:
         """It is shown as damaged, or as what it was: then a file was changed that says nothing of it."""
         assert job.damage is not None
         before, _, name = job.damage.partition(" ")
-        path = self._services.identifications.items.folder(identifier) / name
+        path = self._services.items["identification"].folder(identifier) / name
         is_seen = job.ended is None or name in LIVING or hash_file(path) == before or identifier in changed
         _require(is_seen, f"job {identifier}: nobody sees that {name} was changed")
         _require(job.ended is None or state in (job.ended, "damaged"), f"job {identifier}: {job.ended}, now {state}")
@@ -147,7 +147,7 @@ class Judge:
         """After a start, the events of every job that has ended say so."""
         for identifier, job in self._ledger.jobs.items():
             if job.damage is None and job.ended is not None:
-                workspace = Workspace(self._services.identifications.items.folder(identifier))
+                workspace = Workspace(self._services.items["identification"].folder(identifier))
                 _require(workspace.has_told_end(), f"job {identifier}: its end was never told")
 
 

@@ -99,7 +99,7 @@ class Life:
 
     def _application(self) -> FastAPI:
         """The service as it is, but for what takes time: cheap work, and no patience with a locked database."""
-        http_services.run_identification = partial(cheap_identification, fate=_meet_fate)
+        http_services.perform_job = partial(cheap_identification, fate=_meet_fate)
         database_engine.TIMEOUT_S = LOCK_PATIENCE_S
         event.listen(database_engine.Engine, "begin", self._bound_pages)
         settings = Settings(data_folder=self._folder, fires_schedules=False, max_waiting=50)

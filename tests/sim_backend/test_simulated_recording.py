@@ -32,9 +32,11 @@ def test_exact_torque_is_rigid_body_plus_friction(paper: Robot) -> None:
     assert np.abs(friction).max() > 1.0
 
 
-def test_friction_can_be_replaced(paper: Robot) -> None:
-    plain = record(paper, friction=[FrictionCoefficients()] * 3)
-    viscous = record(paper, friction=[FrictionCoefficients(viscous=1.0)] * 3)
+def test_friction_is_that_of_the_robot(paper: Robot) -> None:
+    plain, viscous = (
+        record(replace(paper, model=replace(paper.model, friction=(FrictionCoefficients(viscous=viscous),) * 3)))
+        for viscous in (0.0, 1.0)
+    )
     np.testing.assert_allclose(viscous.torque_exact - plain.torque_exact, plain.exact.velocity, atol=1e-12)
     unstated = replace(paper, model=replace(paper.model, friction=None))
     np.testing.assert_array_equal(record(unstated).torque_exact, plain.torque_exact)

@@ -11,7 +11,7 @@ from tauscope_drivers.backend import Capabilities, ControlMode, DriveLimits, Sto
 from tauscope_drivers.canopen import objects, power
 from tauscope_drivers.canopen.bus import NMT_START, CanBus
 from tauscope_drivers.canopen.commissioning import commission_drive, write_settings
-from tauscope_drivers.canopen.configuration import BusConfiguration, read_configuration, require_targets
+from tauscope_drivers.canopen.configuration import read_configuration, require_targets
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST
 from tauscope_drivers.canopen.node import BEATS, DriveNode
 from tauscope_drivers.canopen.session import SETTLING_CYCLE_S, Session, listed, possible_rate_hz, rate_limited_by
@@ -42,11 +42,8 @@ class CanopenArm:
         patience_s: float = PATIENCE_S,
         clock: Clock | None = None,
     ) -> None:
-        """Check the configuration; nothing is opened yet.
-
-        Raises DriverError ``refused`` where the configuration is not usable; names the joint and the key.
-        """
-        self._configuration = read_configuration(joints)
+        """Check the configuration; nothing is opened yet. Raises DriverError ``refused``: names joint and key."""
+        self.configuration = read_configuration(joints)
         self._given_bus = bus
         self._patience_s = patience_s
         self._session: Session | None = None
@@ -60,21 +57,16 @@ class CanopenArm:
         self.clock = clock or MonotonicClock()
 
     @property
-    def configuration(self) -> BusConfiguration:
-        """Bus and drives."""
-        return self._configuration
-
-    @property
     def capabilities(self) -> Capabilities:
         """What bus and drives can do; the modes are the drives' own once connected."""
         return Capabilities(
-            joint_count=len(self._configuration.nodes),
+            joint_count=len(self.configuration.nodes),
             modes=self._modes,
             stop_policies=frozenset(power.POLICY_GOALS),
-            largest_rate_hz=possible_rate_hz(self._configuration),
+            largest_rate_hz=possible_rate_hz(self.configuration),
             watchdog_range_s=WATCHDOG_RANGE_S,
             takes_feed_forward=False,
-            rate_limited_by=rate_limited_by(self._configuration),
+            rate_limited_by=rate_limited_by(self.configuration),
             holds_before_torque=False,
             remarks=() if self._session is None else self._session.remarks,
         )
@@ -109,11 +101,7 @@ class CanopenArm:
         watchdog_s: float,
         cycle_s: float | None = None,
     ) -> ArmState:
-        """Configure and commission every drive, arm its heartbeat consumer, take all to *operation enabled* together.
-
-        `cycle_s`: time between two SYNCs, over which the drives interpolate; they keep the one that they know where
-        None [s].
-        """
+        """Commission every drive, arm its heartbeat, enable all. `cycle_s`: of SYNCs; None: the drives' [s]."""
         session = self._require_session()
         if self._mode is not None:
             raise DriverError.refusal("the arm is enabled already; stop it first")
@@ -176,7 +164,7 @@ class CanopenArm:
         """Quick stop and hold, or ramp and let go; drives that are in such a state already stay as they are."""
         session, mode = self._session, self._mode
         if session is None:
-            return ArmState.unknown(self.clock.now_ns(), len(self._configuration.nodes))
+            return ArmState.unknown(self.clock.now_ns(), len(self.configuration.nodes))
         goal = power.POLICY_GOALS.get(policy, Goal.QUICK_STOP)
         for node in session.nodes:
             node.glitches.limit = math.inf
@@ -203,9 +191,9 @@ class CanopenArm:
             self._session, self._mode = None, None
 
     def _open(self) -> Session:
-        bus = CanBus(self._configuration, self._given_bus, self.clock)
-        nodes = tuple(DriveNode.on_bus(bus, node, joint) for joint, node in enumerate(self._configuration.nodes, 1))
-        answer_s = 2.0 / possible_rate_hz(self._configuration) + self._patience_s
+        bus = CanBus(self.configuration, self._given_bus, self.clock)
+        nodes = tuple(DriveNode.on_bus(bus, node, joint) for joint, node in enumerate(self.configuration.nodes, 1))
+        answer_s = 2.0 / possible_rate_hz(self.configuration) + self._patience_s
         return Session(bus, nodes, self.clock, round(answer_s * 1e9), self._caught)
 
     def _refuse_impossible(self, mode: ControlMode, policy: StopPolicy, watchdog_s: float) -> None:
@@ -217,7 +205,7 @@ class CanopenArm:
         elif not WATCHDOG_RANGE_S[0] <= watchdog_s <= WATCHDOG_RANGE_S[1]:
             reason = f"a watchdog of {watchdog_s:g} s is outside {WATCHDOG_RANGE_S[0]:g} to {WATCHDOG_RANGE_S[1]:g} s"
         else:
-            require_targets(self._configuration, mode)
+            require_targets(self.configuration, mode)
         if reason is not None:
             raise DriverError.refusal(reason)
 
@@ -228,10 +216,7 @@ class CanopenArm:
 
 
 def _require_hold(nodes: Sequence[DriveNode], mode: ControlMode, policy: StopPolicy) -> None:
-    """Refuse torque mode where a drive would fall at a stop that is to hold: it has no targets of position to stay at.
-
-    Raises DriverError ``refused``, which names the joint.
-    """
+    """Refuse torque mode where a drive would fall at a stop that is to hold. Raises DriverError ``refused``."""
     falling = [node for node in nodes if not node.stays_stopped]
     if falling and mode is ControlMode.TORQUE and policy is StopPolicy.HOLD:
         raise DriverError.refusal(

@@ -44,10 +44,7 @@ class CanBus:
     def __init__(
         self, configuration: BusConfiguration, bus: can.BusABC | None = None, clock: Clock | None = None
     ) -> None:
-        """Open the bus.
-
-        Raises DriverError ``cannot-connect`` where the interface is not there, or another program holds it.
-        """
+        """Open the bus. Raises DriverError ``cannot-connect``: there is no interface, or another program has it."""
         self._name = f"{configuration.interface} {configuration.channel}"
         self._clock = clock or MonotonicClock()
         self._network = canopen.Network()
@@ -91,11 +88,7 @@ class CanBus:
             raise self._report_loss(error) from error
 
     def send_together(self, frames: Iterable[tuple[int, bytes]]) -> None:
-        """Send frames one after the other, with one write where the adapter takes that.
-
-        Raises DriverError ``lost`` where the bus does not take them.
-        `frames`: iterable of (int, bytes), identifier and payload of each, in their order.
-        """
+        """Send frames, identifier and payload, in their order, with one write where possible. Raises ``lost``."""
         gathering = self._bus.gathering() if isinstance(self._bus, SerialAdapterBus) else nullcontext()
         try:
             with gathering:
@@ -105,12 +98,7 @@ class CanBus:
             raise self._report_loss(error) from error
 
     def receive(self, deadline_ns: int) -> bool:
-        """Wait for one frame and hand it to its handler; the heartbeat is sent meanwhile when it is due.
-
-        Raises DriverError ``lost`` where the bus is gone.
-
-        Returns bool: False where none came.
-        """
+        """Wait for one frame and hand it to its handler, beating meanwhile; False: none came. Raises ``lost``."""
         self.beat()
         wait_s = max(0.0, (deadline_ns - time.monotonic_ns()) * 1e-9)
         if self._heartbeat_period_ns:
@@ -136,10 +124,7 @@ class CanBus:
                 return
 
     def start_heartbeat(self, period_s: float) -> None:
-        """Be alive to the drives from now on, as long as `receive` or `beat` is called.
-
-        `period_s`: time between heartbeats; 0 ends them [s].
-        """
+        """Be alive to the drives while `receive` or `beat` is called. `period_s`: of heartbeats; 0 ends them [s]."""
         self._heartbeat_period_ns = round(period_s * 1e9)
         self.guarded.clear()
         self._next_heartbeat_ns = self._clock.now_ns()

@@ -39,11 +39,7 @@ def write_settings(node: DriveNode) -> bool:
 
 
 def find_missing(node: DriveNode, file: DeviceFile) -> list[Setting]:
-    """Values of a DCF file that a drive does not have yet; only reads.
-
-    Raises DriverError: ``refused``: it does not have their objects, or is under power; ``cannot-connect``: it does not
-    answer.
-    """
+    """A DCF file's values that a drive lacks; only reads. Raises DriverError ``refused``, ``cannot-connect``."""
     missing = [one for one in settings_of(file).written if _read_setting(node, file, one) != one.data]
     if missing and decode_state(node.dictionary.read(objects.STATUSWORD)) in POWERED:
         raise DriverError.refusal(
@@ -90,11 +86,7 @@ def commission_drive(
     watchdog_s: float,
     cycle_s: float | None,
 ) -> None:
-    """Write all of it by SDO; each value is read back.
-
-    Raises DriverError ``refused`` where the drive does not take a value.
-    `cycle_s`: time between two SYNCs; the drive keeps the one that it knows where None [s].
-    """
+    """Write all of it by SDO, read back. Raises DriverError ``refused``. `cycle_s`: of SYNCs; None: the drive's [s]."""
     holds = stop_policy is StopPolicy.HOLD
     node.dictionary.write(objects.MODE_OF_OPERATION, node.mode_numbers[mode])
     option = _choose(node, objects.QUICK_STOP_OPTION, _STAYS_STOPPED if holds else _LETS_GO)

@@ -28,10 +28,7 @@ _NODE_KEYS = ("node_id", "counts_per_turn", "zero_count", "direction", "rated_to
 
 @dataclass(frozen=True)
 class NodeConfiguration:
-    """One drive.
-
-    `rated_torque_nm`: at the motor shaft, in place of what the drive states (0x6076): makers scale it differently [Nm].
-    """
+    """One drive. `rated_torque_nm`: at the motor shaft, in place of 0x6076, which makers scale differently [Nm]."""
 
     node_id: int
     counts_per_turn: float
@@ -56,11 +53,7 @@ class BusConfiguration:
 
 
 def read_configuration(joints: Sequence[drive_block.DriveJoint]) -> BusConfiguration:
-    """Bus and drives of an arm.
-
-    Raises DriverError ``refused`` where a key is missing, unknown or not usable, or the EDS or DCF file describes no
-    drive that the driver can use; names the joint and the key.
-    """
+    """Bus and drives of an arm. Raises DriverError ``refused``: names joint and key, or what an EDS or DCF lacks."""
     first = joints[0]
     drive_block.require_known_keys(joints, _BUS_KEYS, _NODE_KEYS)
     nodes = tuple(read_node(joint) for joint in joints)
@@ -76,10 +69,7 @@ def read_configuration(joints: Sequence[drive_block.DriveJoint]) -> BusConfigura
 
 
 def require_targets(configuration: BusConfiguration, mode: ControlMode) -> None:
-    """Refuse a mode whose targets a drive does not take, by its EDS or DCF file.
-
-    Raises DriverError ``refused``, which names joint, file and object.
-    """
+    """Refuse a mode whose targets a drive's EDS or DCF lacks. Raises DriverError ``refused``: joint and object."""
     for joint, node in enumerate(configuration.nodes, 1):
         if node.device_file is None:
             continue

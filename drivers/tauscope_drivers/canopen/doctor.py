@@ -46,10 +46,7 @@ def can_interfaces() -> list[Finding]:
 
 
 def examine(joints: Sequence[DriveJoint]) -> list[Finding]:
-    """Bus, and every drive that the robot file names.
-
-    Raises DriverError: ``refused``: a ``drive`` block is not valid.
-    """
+    """Bus, and every drive that the robot file names. Raises DriverError ``refused``: a ``drive`` block is invalid."""
     configuration = read_configuration(joints)
     subject = f"{configuration.interface} {configuration.channel}"
     try:
@@ -166,13 +163,9 @@ _PACING_S = 0.0005
 
 
 def scan_bus(interface: str, channel: str, bit_rates: Sequence[int] | None = None) -> Iterator[FoundDevice]:
-    """Every node that answers, one bit rate after the other.
+    """Every node that answers, one bit rate after the other: at a wrong one this disturbs a bus that is in use.
 
-    Reads the device type (0x1000) by SDO, then name and version of those that answered. At a wrong bit rate
-    this disturbs a bus that is in use: name the rate where anything moves. Raises DriverError ``cannot-connect`` where
-    the bus is missing, not permitted or taken.
-
-    `bit_rates`: to try [bit/s]; the usual ones where None, one where the interface has a fixed one.
+    Raises DriverError ``cannot-connect``. `bit_rates`: to try [bit/s]; None: the usual ones, or the interface's own.
     """
     if bit_rates is None:
         bit_rates = USUAL_BIT_RATES[:1] if interface in _FIXED_RATE else USUAL_BIT_RATES

@@ -7,16 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope_drivers.backend import ControlMode, StopPolicy
-from tauscope_drivers.canopen import objects
-from tauscope_drivers.canopen.bus import (
-    HEARTBEAT_ID,
-    MASTER_NODE,
-    NMT_ID,
-    NMT_PRE_OPERATIONAL,
-    NMT_START,
-    SYNC_ID,
-    FrameHandler,
-)
+from tauscope_drivers.canopen import bus, objects
 from tauscope_drivers.canopen.commissioning import commission_drive, write_settings
 from tauscope_drivers.canopen.configuration import NodeConfiguration, read_configuration, require_targets
 from tauscope_drivers.canopen.data_sheet.needs import needs_guarding, pdo_slots, present_objects
@@ -75,11 +66,13 @@ class _PlannedDictionary:
         command = _DOWNLOAD | (4 - len(data)) << 2
         self._add(f"{entry} := {text}", bytes([command]) + _place(entry) + data.ljust(4, b"\0"))
 
-    def subscribe(self, identifier: int, handler: FrameHandler) -> None:
+    def subscribe(self, identifier: int, handler: bus.FrameHandler) -> None:
         """Nobody answers."""
 
     def ask_guard(self, node_id: int) -> bool:
-        self.frames.append(PlannedFrame("enable", f"{self._label}: guarded, alive?", f"{HEARTBEAT_ID + node_id:03X}#R"))
+        self.frames.append(
+            PlannedFrame("enable", f"{self._label}: guarded, alive?", f"{bus.HEARTBEAT_ID + node_id:03X}#R")
+        )
         return True
 
     def _add(self, meaning: str, payload: bytes) -> None:
@@ -87,27 +80,23 @@ class _PlannedDictionary:
 
 
 def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:
-    """Frames of a connection, of enabling, of some cycles and of a stop, for drives that answer as they should.
+    """Frames of a connection, of enabling, of some cycles and of a stop; a heartbeat is shown once.
 
-    An SDO is shown as an expedited transfer, and one of more than four bytes by its first frame alone; heartbeats,
-    which are sent as time passes, are shown once. Raises DriverError: ``refused``: a ``drive`` block or a limit is not
-    possible.
-
-    `joints`: base first; each ``drive`` block has to state ``rated_torque_nm``.
+    Raises DriverError ``refused``. `joints`: base first; each ``drive`` block has to state ``rated_torque_nm``.
     """
     mode, limits, targets, cycle_s = request.mode, request.limits, request.targets, request.cycle_s
     configuration = read_configuration(joints)
     require_targets(configuration, mode)
     nodes = [_plan_node(number, wanted) for number, wanted in enumerate(configuration.nodes, 1)]
     require_sensible(limits, targets[0], [node.place for node, _ in nodes])
-    yield _frame("connect", "all nodes: pre-operational", NMT_ID, bytes([NMT_PRE_OPERATIONAL, 0]))
+    yield _frame("connect", "all nodes: pre-operational", bus.NMT_ID, bytes([bus.NMT_PRE_OPERATIONAL, 0]))
     for node, _ in nodes:
         write_settings(node)
     for node, dictionary in nodes:
         commission_drive(node, mode, limits, StopPolicy.HOLD, request.watchdog_s, cycle_s)
         yield from dictionary.frames
-    yield _frame("enable", "master: alive", HEARTBEAT_ID + MASTER_NODE, bytes([0x05]))
-    yield _frame("enable", "all nodes: operational", NMT_ID, bytes([NMT_START, 0]))
+    yield _frame("enable", "master: alive", bus.HEARTBEAT_ID + bus.MASTER_NODE, bytes([0x05]))
+    yield _frame("enable", "all nodes: operational", bus.NMT_ID, bytes([bus.NMT_START, 0]))
     for state in _TO_POWER:
         word = next_controlword(state, Goal.OPERATION_ENABLED)
         yield from _cycle([node for node, _ in nodes], mode, "enable", word, targets[0])
@@ -145,7 +134,7 @@ def _cycle(
         what = f"{place:.4f}" if mode is ControlMode.POSITION else "0"
         for identifier, payload in node.targets(mode, word, float(place), 0.0):
             yield _frame(phase, f"{node.place}: controlword 0x{word:04X}, target {mode} {what}", identifier, payload)
-    yield _frame(phase, "all nodes: SYNC", SYNC_ID, b"")
+    yield _frame(phase, "all nodes: SYNC", bus.SYNC_ID, b"")
 
 
 def _place(entry: DriveObject) -> bytes:

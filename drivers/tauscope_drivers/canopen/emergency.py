@@ -49,10 +49,7 @@ def decode_emergency(payload: bytes) -> int | None:
 
 
 def describe_error(code: int, joint: int) -> Fault | None:
-    """A fault for an error code (0x603F or an emergency); None for 0x00xx, which says that an error is gone.
-
-    `joint`: number of the joint, from 1.
-    """
+    """A fault for an error code (0x603F, or an emergency); None for 0x00xx: an error is gone. `joint`: from 1."""
     if code & 0xFF00 == 0:
         return None
     for mask, pattern, name, meaning, remedy in _MEANINGS:

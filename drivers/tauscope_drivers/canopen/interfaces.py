@@ -29,11 +29,7 @@ _CONNECT_S = 3.0
 
 
 def open_interface(interface: str, channel: str, bit_rate: int, options: Mapping[str, Any]) -> can.BusABC:
-    """An interface by the name that python-can knows it by.
-
-    Raises can.CanError, OSError, ValueError, NotImplementedError, ImportError, TypeError where it is not there, not
-    permitted, taken, or needs an option that it was not given.
-    """
+    """An interface by its name in python-can. Raises CanError, OSError, ValueError, TypeError, or ImportError."""
     if interface == "slcan":
         if options:
             raise ValueError(f"slcan takes no options, and was given {', '.join(options)}")
@@ -44,10 +40,7 @@ def open_interface(interface: str, channel: str, bit_rate: int, options: Mapping
 
 
 def _open_daemon(channel: str, bit_rate: int, options: Mapping[str, Any]) -> can.BusABC:
-    """A bus of another machine, by its socketcand.
-
-    Without ``tcp_tune`` a frame waits until the one before is acknowledged: three of four cycles have no answer then.
-    """
+    """A bus of another machine. Without ``tcp_tune`` a frame waits for the last one: most cycles lose theirs."""
     known = {**can.util.load_config(config={"interface": _DAEMON, "channel": channel}), **options}
     if "host" not in known:
         raise ValueError("it needs the host of the daemon: options: {host: NAME}")
@@ -66,10 +59,7 @@ class ClaimedError(Exception):
 
 
 class BusClaim:
-    """Held from construction until `release`, or until the process ends, however it ends.
-
-    It is the name of a socket in the abstract namespace, which the kernel keeps for one process of this machine.
-    """
+    """Held until `release`, or the process's end: the name of a socket, which the kernel keeps for one process."""
 
     def __init__(self, interface: str) -> None:
         """Claim. Raises ClaimedError where another process has it."""
@@ -116,10 +106,7 @@ class SerialAdapterBus(slcanBus):
     _gathered: bytearray | None = None
 
     def __init__(self, path: str, bit_rate: int) -> None:
-        """Open the adapter, and the channel on it.
-
-        Raises CanInitializationError where the port is missing, not permitted or taken; names the holder.
-        """
+        """Open adapter and channel. Raises CanInitializationError: no port, not permitted, or who has it."""
         holder = find_holder(path)
         if holder is not None:
             raise CanInitializationError(f"{holder} has it")
@@ -134,10 +121,7 @@ class SerialAdapterBus(slcanBus):
 
     @contextlib.contextmanager
     def gathering(self) -> Iterator[None]:
-        """Send what is sent within the context with one write, on leaving it; nothing of it where that fails.
-
-        Raises CanOperationError where the port does not take it.
-        """
+        """Send what is sent within the context with one write on leaving it. Raises CanOperationError: not taken."""
         self._gathered = bytearray()
         try:
             yield
@@ -188,10 +172,7 @@ class SerialAdapterBus(slcanBus):
         return line
 
     def _next_line(self) -> str | None:
-        """The first whole line that says something, taken out of the buffer.
-
-        What only acknowledges a command says nothing, and a frame that lacks characters is lost.
-        """
+        """The first whole line that says something: no acknowledgement, no frame that lacks characters."""
         while ends := [place for mark in (self._OK, self._ERROR) if (place := self._buffer.find(mark)) >= 0]:
             end = min(ends) + 1
             line = self._buffer[:end].decode("ascii", "replace")

@@ -10,14 +10,7 @@ from tauscope_drivers.canopen.bus import EMERGENCY_ID, HEARTBEAT_ID, MASTER_NODE
 from tauscope_drivers.canopen.configuration import NodeConfiguration
 from tauscope_drivers.canopen.data_sheet.needs import needs_guarding, pdo_slots, present_objects, require_identity
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST, decode_emergency, describe_error
-from tauscope_drivers.canopen.objects import (
-    STAYING_OPTIONS,
-    SUBSTITUTES,
-    TARGETS,
-    DriveObject,
-    describe_absent,
-    select_modes,
-)
+from tauscope_drivers.canopen.objects import SUBSTITUTES, TARGETS, DriveObject
 from tauscope_drivers.canopen.sdo import NodeDictionary
 from tauscope_drivers.canopen.state_machine import ENABLE_OPERATION, DriveState, Goal, decode_state, next_controlword
 from tauscope_drivers.canopen.units import DriveUnits, drive_units, read_rated_torque
@@ -75,11 +68,7 @@ class Measurement:
 
 @dataclass(eq=False)
 class DriveNode:
-    """A drive on the bus.
-
-    `last_position`: of the joint when it last answered: the place to stay at, never a measurement [rad or m].
-    `mode_numbers`: mode of operation for each control mode that it has.
-    """
+    """A drive. `last_position`: when it last answered, never a measurement [rad or m]; `mode_numbers`: its modes'."""
 
     configuration: NodeConfiguration
     joint: int  # number of its joint, from 1
@@ -161,10 +150,10 @@ class DriveNode:
         self._find_watchdog()
         found = (entry for entry in SUBSTITUTES if self.dictionary.read_optional(entry) is not None)
         self.present = frozenset(found) & (frozenset(SUBSTITUTES) if file is None else present_objects(file))
-        self.remarks = (*([objects.GUARDED] if self.is_guarded else []), *describe_absent(self.present))
-        self.stays_stopped = self.dictionary.read_optional(objects.QUICK_STOP_OPTION) in STAYING_OPTIONS
+        self.remarks = (*([objects.GUARDED] if self.is_guarded else []), *objects.describe_absent(self.present))
+        self.stays_stopped = self.dictionary.read_optional(objects.QUICK_STOP_OPTION) in objects.STAYING_OPTIONS
         self.units = self._learn_units()
-        self.mode_numbers = select_modes(self.dictionary.read(objects.SUPPORTED_MODES))
+        self.mode_numbers = objects.select_modes(self.dictionary.read(objects.SUPPORTED_MODES))
         if not self.has(objects.VELOCITY_ACTUAL):
             self.mode_numbers.pop(ControlMode.TORQUE, None)
         if self.mode_numbers.get(ControlMode.POSITION) == objects.INTERPOLATED_POSITION:
@@ -191,11 +180,7 @@ class DriveNode:
         self.error_code = self.values.get(objects.ERROR_CODE) or self.error_code
 
     def targets(self, mode: ControlMode, controlword: int, position: float, torque: float) -> list[tuple[int, bytes]]:
-        """Identifier and payload of its target frames.
-
-        Raises DriverError ``refused`` where the target is beyond what the drive can be told.
-        `position`: of the joint, finite [rad or m]; `torque`: of the joint, finite [Nm or N].
-        """
+        """Its target frames. Raises DriverError ``refused`` beyond what it takes. [rad or m], [Nm or N]; finite."""
         target = TARGETS[mode][self.mode_numbers[mode]]
         quantity = self.units.counts(position) if mode is ControlMode.POSITION else self.units.permille(torque)
         is_enabled = controlword == ENABLE_OPERATION and self.last_state is DriveState.OPERATION_ENABLED
@@ -300,10 +285,7 @@ class DriveNode:
             self.bus.guarded.add(self.configuration.node_id)
 
     def require_guarding(self) -> None:
-        """Ask it by a remote frame: an adapter that sends none would leave it unguarded, for it counts from the first.
-
-        Raises DriverError ``refused`` where it does not answer.
-        """
+        """Ask it by a remote frame: guarding counts from the first. Raises DriverError ``refused``: no answer."""
         if not self.bus.ask_guard(self.configuration.node_id):
             raise DriverError.refusal(
                 f"{self.place}: answers no remote frame, and would not notice that the host is gone; "

@@ -79,10 +79,7 @@ TARGETS: Mapping[ControlMode, Mapping[int, DriveObject]] = {
 
 
 def select_modes(supported: int) -> dict[ControlMode, int]:
-    """Mode of operation for each control mode that a drive has.
-
-    `supported`: 0x6502, in which bit n - 1 stands for mode n.
-    """
+    """Mode of operation for each control mode that a drive has. `supported`: 0x6502; bit n - 1 stands for mode n."""
     found = {
         mode: next((number for number in targets if supported >> (number - 1) & 1), None)
         for mode, targets in TARGETS.items()

@@ -19,11 +19,7 @@ STILL_CYCLES = 4  # cycles at one place before anything moves: drives interpolat
 
 
 def power_up(session: Session, mode: ControlMode) -> tuple[ArmState, Array]:
-    """Take all drives to *operation enabled*; targets are where the joints are when their drives get there.
-
-    Raises DriverError: ``fault`` or ``refused``: a drive does not get there. Returns the state of the last cycle, and
-    the targets that the drives stand at, (n,) [rad or m].
-    """
+    """Take all drives to *operation enabled* where they stand; the state, and targets, (n,). Raises DriverError."""
     place = _read_settled_place(session, mode)
 
     def cycle() -> ArmState:
@@ -56,11 +52,7 @@ def _note_mode(node: DriveNode, mode: ControlMode) -> None:
 
 
 def _read_settled_place(session: Session, mode: ControlMode) -> Array:
-    """Where the joints are now, by process data, read before any drive changes its state.
-
-    One that holds may be back under power with its first target: that must not be where it was when commissioning
-    began.
-    """
+    """Where the joints are, before any drive changes its state: one that holds may be powered again with it."""
     stay = session.standstill()
 
     def cycle() -> ArmState:
@@ -100,14 +92,12 @@ _RESTART_REMEDY = "support the arm, look for a dip of its supply, then acknowled
 
 
 def stop_in_cycle(session: Session, mode: ControlMode, goal: Goal) -> bool:
-    """Stop by process data, all drives together; False where not all got there.
-
-    Nobody waits for a drive that takes no process data any more: it has stopped by itself.
-    """
+    """Stop by process data, all together; False where not all got there: a drive that takes none has stopped itself."""
 
     def is_nothing_left_to_wait_for() -> bool:
         are_stopped = all(has_stopped(node, goal) or node.is_deaf for node in session.nodes)
-        return are_stopped and (session.has_braked or not any(node.holds_by_targets for node in session.nodes))
+        has_braked = session.brake is None or session.brake.is_at_rest(session.clock.now_ns())
+        return are_stopped and (has_braked or not any(node.holds_by_targets for node in session.nodes))
 
     def cycle() -> ArmState:
         return session.cycle(mode, goal, session.stop_targets(), session.unhurried_ns)

@@ -27,11 +27,7 @@ class PdoLayout:
 
 
 def encode_pdo(layout: PdoLayout, values: Mapping[DriveObject, int]) -> bytes:
-    """Payload of a frame.
-
-    A value that its object cannot hold is an error and never cut to size: a target that wraps round or saturates is
-    full torque. Raises OverflowError where a value does not fit its object; names the object.
-    """
+    """Payload of a frame. Raises OverflowError, never cuts to size: a target that wraps or saturates is full torque."""
     payload = bytearray()
     for entry in layout.objects:
         try:
@@ -141,10 +137,7 @@ class PdoSlots:
 
 
 def plan_pdos(slots: PdoSlots, target: DriveObject, optional: Iterable[DriveObject]) -> PdoPlan:
-    """PDOs for a target and for all measurements.
-
-    `target`: what the mode is commanded by; `optional`: measurements that the drive has beside the needed ones.
-    """
+    """PDOs for a target and for all measurements. `optional`: measurements that the drive has beside those needed."""
     received, not_received = _assign(RECEIVED, slots.received, (objects.CONTROLWORD, target), ())
     sent, not_sent = _assign(SENT, slots.sent, MEASURED, tuple(optional))
     return PdoPlan(received, sent, (*not_received, *not_sent))
@@ -201,10 +194,7 @@ _SYNC_BYTES = 0
 
 
 def frame_bits(payload_bytes: int) -> int:
-    """Longest form of a standard data frame: 47 + 8 d + ⌊(34 + 8 d − 1)/4⌋ bits for d bytes, interframe space included.
-
-    `payload_bytes`: d, 0 to 8 [bytes].
-    """
+    """Longest standard data frame: 47 + 8 d + ⌊(34 + 8 d − 1)/4⌋ bits, space between frames included; d bytes."""
     return 47 + 8 * payload_bytes + (34 + 8 * payload_bytes - 1) // 4
 
 
@@ -214,13 +204,7 @@ def cycle_bits(nodes: int, payloads: Sequence[int]) -> int:
 
 
 def largest_rate_hz(nodes: int, payloads: Sequence[int], bit_rate: float, serial_baud: float | None = None) -> float:
-    """Most cycles a second that the bus carries, and the adapter where it is a true serial line.
-
-    `payloads`: of the PDOs of one node [bytes].
-    `serial_baud`: of the adapter's serial line at 10 bits a byte [bit/s]; None where it is none (a USB CDC adapter
-        ignores it).
-    Returns float: [Hz].
-    """
+    """Most cycles a second of bus and serial line [Hz]. `payloads`: of a node's PDOs [bytes]."""
     bus_s = cycle_bits(nodes, payloads) / (LARGEST_LOAD * bit_rate)
     return 1.0 / max(bus_s, _serial_s(nodes, payloads, serial_baud))
 

@@ -76,18 +76,11 @@ class NodeDictionary:
         self.node_id = node_id
 
     def read(self, entry: DriveObject) -> int:
-        """Value of an entry.
-
-        Raises DriverError: ``cannot-connect``: the node does not answer; ``refused``: it has no such entry.
-        """
+        """Value of an entry. Raises DriverError: ``cannot-connect``: no answer; ``refused``: there is no such entry."""
         return int.from_bytes(self.read_data(entry), "little", signed=entry.signed)
 
     def read_surely(self, entry: DriveObject) -> int:
-        """Value of an entry that every measurement hangs on: as two readings in a row have it.
-
-        Raises DriverError: ``cannot-connect``: the node does not answer, or gives another value each time; ``refused``:
-        it has no such entry.
-        """
+        """Value of an entry that all hangs on: as two readings in a row have it. Raises DriverError as `read` does."""
         values = [self.read(entry)]
         for _ in range(_READINGS):
             values.append(self.read(entry))
@@ -98,10 +91,7 @@ class NodeDictionary:
         )
 
     def read_data(self, entry: DriveObject) -> bytes:
-        """Value of an entry as transferred, cut to its size; of a text without the zeros that end it.
-
-        Raises DriverError: ``cannot-connect``: the node does not answer; ``refused``: it has no such entry.
-        """
+        """Value of an entry, cut to its size, a text without its zeros. Raises DriverError as `read` does."""
         try:
             data = bytes(_retry_transfer(lambda: self._client.upload(entry.index, entry.subindex)))
         except (SdoError, can.CanError, OSError) as error:
@@ -125,11 +115,7 @@ class NodeDictionary:
             return ""
 
     def write(self, entry: DriveObject, value: int) -> None:
-        """Write an entry and read it back.
-
-        Raises DriverError: ``refused``: the drive keeps another value or forbids the write; ``cannot-connect``: it does
-        not answer.
-        """
+        """Write an entry and read it back. Raises DriverError: ``refused``: not kept; ``cannot-connect``: no answer."""
         kept = None
         for _ in range(_WRITES):
             self.send(entry, value)
@@ -141,17 +127,11 @@ class NodeDictionary:
         )
 
     def send(self, entry: DriveObject, value: int) -> None:
-        """Write an entry that cannot be read back yet.
-
-        Raises DriverError: ``cannot-connect``: the drive does not answer; ``refused``: it forbids the write.
-        """
+        """Write an entry that cannot be read back yet. Raises DriverError: ``cannot-connect`` or ``refused``."""
         self.send_data(entry, value.to_bytes(entry.bits // 8, "little", signed=entry.signed), str(value))
 
     def send_data(self, entry: DriveObject, data: bytes, text: str) -> None:
-        """Write an entry as transferred.
-
-        Raises DriverError: ``cannot-connect``: the drive does not answer; ``refused``: it forbids the write.
-        """
+        """Write an entry as transferred. Raises DriverError: ``cannot-connect``: no answer; ``refused``: forbidden."""
         try:
             _retry_transfer(lambda: self._client.download(entry.index, entry.subindex, data))
         except (SdoError, can.CanError, OSError) as error:
@@ -177,10 +157,7 @@ def _retry_transfer(transfer: Callable[[], _Answer]) -> _Answer:
 
 
 class PumpedSdoClient(SdoClient):
-    """The library's SDO client, taking its answers off the bus itself instead of from a receiving thread.
-
-    What does not answer the last question is dropped: an answer that came too late would else be taken for the next.
-    """
+    """The library's SDO client without a receiving thread; drops what does not answer the last question."""
 
     RESPONSE_TIMEOUT = SDO_TIMEOUT_S
     MAX_RETRIES = ATTEMPTS

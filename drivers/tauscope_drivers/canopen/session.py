@@ -41,10 +41,7 @@ class HostBrake:
     """Brings joints to rest by targets, with constant deceleration."""
 
     def __init__(self, position: Array, velocity: Array, begin_ns: int) -> None:
-        """Begin at the present motion.
-
-        `position`: (n,) [rad or m]; `velocity`: (n,) [rad/s or m/s]; `begin_ns`: present instant [ns].
-        """
+        """Begin at a motion. `position`: (n,) [rad or m]; `velocity`: (n,) [rad/s or m/s]; `begin_ns`: now [ns]."""
         self._position, self._velocity, self._begin_ns = position, velocity, begin_ns
 
     def targets(self, now_ns: int) -> Array:
@@ -76,10 +73,7 @@ def rate_limited_by(configuration: BusConfiguration) -> str:
 
 @dataclass
 class Session:
-    """An arm's drives, reached.
-
-    `settling_ns`: cycle while drives change state: that of the control loop, once it is known [ns].
-    """
+    """An arm's drives, reached. `settling_ns`: cycle while drives change state; the control loop's once known [ns]."""
 
     bus: CanBus
     nodes: tuple[DriveNode, ...]
@@ -118,11 +112,6 @@ class Session:
         for node, state in zip(self.nodes, states, strict=True):
             if state is not DriveState.OPERATION_ENABLED:
                 self.bus.command_nodes(NMT_PRE_OPERATIONAL, node.configuration.node_id)
-
-    @property
-    def has_braked(self) -> bool:
-        """Whether the targets of `stop_targets` have come to rest."""
-        return self.brake is None or self.brake.is_at_rest(self.clock.now_ns())
 
     def stop_targets(self) -> Setpoint:
         """Targets of a stop: they bring drives to rest that stop by targets; others do not follow them."""

@@ -1,7 +1,4 @@
-"""The CiA 402 power state machine as pure functions: statusword to state, state and goal to the next controlword.
-
-States and bits are those of CiA 402-2 (IEC 61800-7-201), objects 0x6041 and 0x6040.
-"""
+"""The CiA 402-2 power state machine (0x6041, 0x6040): statusword to state, state and goal to the next controlword."""
 
 from enum import StrEnum
 
@@ -66,11 +63,7 @@ def decode_state(statusword: int) -> DriveState | None:
 
 
 def next_controlword(state: DriveState | None, goal: Goal) -> int:
-    """Controlword (0x6040) of the next step from a state towards a goal; to be sent in every cycle.
-
-    A drive in fault, one whose state is not known and one that is not ready gets no voltage: only an explicit
-    `FAULT_RESET` takes it further.
-    """
+    """Controlword (0x6040) towards a goal, sent every cycle; only a reset gives voltage to a drive in fault."""
     if goal is Goal.OPERATION_ENABLED:
         return _TO_OPERATION.get(state, DISABLE_VOLTAGE) if state is not None else DISABLE_VOLTAGE
     if goal is Goal.QUICK_STOP and state in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE):

@@ -24,11 +24,10 @@ class RatedTorque:
 def read_rated_torque(
     value: int, gear_ratio: float, torque_limit: float | None, rated_current_ma: int | None
 ) -> RatedTorque:
-    """Rated torque in the unit that fits the joint's torque limit, else the rated current (0x6075).
+    """Rated torque in the unit that fits the joint's torque limit, else by the rated current (0x6075).
 
-    Raises ValueError where neither unit fits, or it reads 0.
-    `value`: as the drive states it [mNm or µNm]; `torque_limit`: of the joint; None where the robot file states none
-    [Nm or N]; `rated_current_ma`: None where the drive states none [mA].
+    Raises ValueError where none fits. `value`: [mNm or µNm]; `torque_limit`: of the joint [Nm or N]; None where not
+    stated.
     """
     milli, micro = value * _MILLI, value * _MICRO
     if value <= 0:
@@ -55,12 +54,10 @@ def _expect(gear_ratio: float, torque_limit: float | None, rated_current_ma: int
 
 @dataclass(frozen=True)
 class DriveUnits:
-    """What one unit of a drive means at the joint.
+    """What one unit of a drive means at the joint, signed where it turns the other way round.
 
-    `radians_per_count`: 2π ÷ (counts a motor turn × gear ratio), signed where the drive turns the other way round than
-        the joint; metres a count on prismatic joints [rad or m].
-    `torque_per_permille`: joint torque for one part in thousand of the motor's rated torque (0x6076), signed likewise
-        [Nm or N].
+    `radians_per_count`: 2π ÷ (counts a motor turn × gear ratio), metres on prismatic joints; `torque_per_permille`:
+    joint torque for 1 ‰ of the motor's rated torque (0x6076) [Nm or N].
     """
 
     radians_per_count: float
@@ -88,10 +85,7 @@ class DriveUnits:
         return round(torque / self.torque_per_permille)
 
     def torque_cap(self, torque: float) -> int:
-        """Largest whole per mille within a torque limit (0x6072).
-
-        `torque`: limit of the joint, infinite where there is none [Nm or N].
-        """
+        """Largest whole per mille within a torque limit (0x6072). `torque`: infinite where there is none [Nm or N]."""
         most = abs(torque / self.torque_per_permille)
         return 0xFFFF if most >= 0xFFFF else math.floor(most)
 

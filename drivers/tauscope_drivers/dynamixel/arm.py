@@ -45,11 +45,7 @@ class DynamixelArm(SerialServoArm[Session]):
         keeps_settings: bool = False,
         clock: Clock | None = None,
     ) -> None:
-        """Nothing is opened yet.
-
-        Raises DriverError: ``refused``: a ``drive`` block is not valid.
-        `keeps_settings`: whether changes of EEPROM stay after the arm is let go.
-        """
+        """Nothing is opened yet. Raises DriverError ``refused``. `keeps_settings`: changes of EEPROM stay."""
         super().__init__(read_configuration(joints), slack_s, clock)
         self._keeps_settings = keeps_settings
         self._bounds = Bounds((), (), (), ())
@@ -75,7 +71,7 @@ class DynamixelArm(SerialServoArm[Session]):
         )
 
     def _open_session(self) -> Session:
-        return open_session(ServoBus(self._port, self._clock), self._configuration.servos)
+        return open_session(ServoBus(self._port, self.clock), self._configuration.servos)
 
     def _find_obstacle(self, mode: ControlMode, policy: StopPolicy, watchdog_s: float) -> str | None:
         if mode not in self.capabilities.modes:
@@ -116,17 +112,17 @@ class DynamixelArm(SerialServoArm[Session]):
         self._last_goals = None
         if mode is ControlMode.TORQUE or cycle_s is None or not has_room_for_speeds(*self._budget(), cycle_s):
             return None
-        return GoalPace(session.servos, held, self._bounds.velocity, cycle_s, self._clock.now_ns())
+        return GoalPace(session.servos, held, self._bounds.velocity, cycle_s, self.clock.now_ns())
 
     def _cycle(self, session: Session, mode: ControlMode, setpoint: Setpoint) -> ArmState:
         """Sync Write of the goals, Sync Read of all servos, health of one servo."""
         name, goals = goals_of(session.servos, mode, self._bounds, setpoint)
-        silence_s = (self._clock.now_ns() - self._last_exchange_ns) * 1e-9
+        silence_s = (self.clock.now_ns() - self._last_exchange_ns) * 1e-9
         if session.health.runaway is None:
             if self._pace is None:
                 session.group.write(name, goals)
             else:
-                session.group.write_goals(goals, self._pace.speeds(goals, self._clock.now_ns()))
+                session.group.write_goals(goals, self._pace.speeds(goals, self.clock.now_ns()))
         self._last_goals = goals if mode is ControlMode.POSITION else None
         reading = session.group.read()
         joint, values = session.group.read_health()

@@ -12,16 +12,7 @@ from tauscope_drivers.dynamixel.control_table import Block, Item, encode_items
 from tauscope_drivers.dynamixel.packets import DynamixelParser, Status
 from tauscope_drivers.errors import DriverError
 from tauscope_drivers.serial_port import SerialPort, expect_latency_s
-from tauscope_drivers.serial_servos.bus import (
-    ATTEMPTS,
-    PATIENCE_S,
-    SHORTEST_RETURN_DELAY_S,
-    Answers,
-    BusTiming,
-    CycleTraffic,
-    SerialServoBus,
-    largest_rate_hz,
-)
+from tauscope_drivers.serial_servos import bus as serial_bus
 from tauscope_drivers.serial_servos.configuration import BusConfiguration
 
 
@@ -88,7 +79,7 @@ _FAST_SERVO_BYTES = 4
 
 def count_traffic(
     servos: int, *, goal_bytes: int = 4, health_bytes: int = 3, fast: bool = False, families: int = 1
-) -> CycleTraffic:
+) -> serial_bus.CycleTraffic:
     """A cycle of so many servos. `health_bytes`: that one servo is asked for besides; 0 for no such read [bytes]."""
     write = families * _SYNC_BYTES + servos * (1 + goal_bytes)
     ask = families * _SYNC_BYTES + servos
@@ -96,7 +87,7 @@ def count_traffic(
     if fast:
         answers = families * _FAST_BYTES + servos * (_STATE_BYTES + _FAST_SERVO_BYTES)
     health = _READ_BYTES + _STATUS_BYTES + health_bytes if health_bytes else 0
-    return CycleTraffic(
+    return serial_bus.CycleTraffic(
         servos,
         write + ask + answers + health,
         (families if fast else servos) + bool(health_bytes),
@@ -105,19 +96,21 @@ def count_traffic(
     )
 
 
-def has_room_for_speeds(traffic: CycleTraffic, timing: BusTiming, cycle_s: float) -> bool:
+def has_room_for_speeds(traffic: serial_bus.CycleTraffic, timing: serial_bus.BusTiming, cycle_s: float) -> bool:
     """Whether a cycle is long enough to send each servo a speed with its goal."""
     more = traffic.servos * _SPEED_BYTES
-    return largest_rate_hz(replace(traffic, bytes=traffic.bytes + more), timing) * cycle_s >= 1.0
+    return serial_bus.largest_rate_hz(replace(traffic, bytes=traffic.bytes + more), timing) * cycle_s >= 1.0
 
 
-def planned_budget(configuration: BusConfiguration[Any]) -> tuple[CycleTraffic, BusTiming]:
+def planned_budget(configuration: BusConfiguration[Any]) -> tuple[serial_bus.CycleTraffic, serial_bus.BusTiming]:
     """Before the servos are reached: with what they will be set to."""
-    timing = BusTiming(configuration.baud, SHORTEST_RETURN_DELAY_S, expect_latency_s(configuration.port))
+    timing = serial_bus.BusTiming(
+        configuration.baud, serial_bus.SHORTEST_RETURN_DELAY_S, expect_latency_s(configuration.port)
+    )
     return count_traffic(len(configuration.servos)), timing
 
 
-class ServoBus(SerialServoBus[Status]):
+class ServoBus(serial_bus.SerialServoBus[Status]):
     """Speaks to the servos of one port; one thread's own."""
 
     def __init__(self, port: SerialPort, clock: Clock | None = None) -> None:
@@ -127,8 +120,8 @@ class ServoBus(SerialServoBus[Status]):
 
     def ping(self, servo: int) -> tuple[int, int] | None:
         """Model number and firmware of a servo; None where it does not answer."""
-        for _ in range(ATTEMPTS):
-            answer = self._ask(servo, packets.encode_ping(servo), 3, PATIENCE_S)
+        for _ in range(serial_bus.ATTEMPTS):
+            answer = self._ask(servo, packets.encode_ping(servo), 3, serial_bus.PATIENCE_S)
             if answer is not None and len(answer.data) == 3:
                 return struct.unpack("<HB", answer.data)
         return None
@@ -146,33 +139,24 @@ class ServoBus(SerialServoBus[Status]):
         return self._ask(servo, packets.encode_read(servo, address, length), length, patience_s)
 
     def read_block(self, servo: int, block: Block) -> dict[str, int]:
-        """Values of a block by their names.
-
-        Raises DriverError: ``cannot-connect``: the servo does not answer; ``refused``: it has no such block.
-        """
+        """Values of a block by name. Raises DriverError: ``cannot-connect``: no answer; ``refused``: no such block."""
         answer = None
-        for _ in range(ATTEMPTS):
-            answer = self.read_once(servo, block.address, block.length, PATIENCE_S)
+        for _ in range(serial_bus.ATTEMPTS):
+            answer = self.read_once(servo, block.address, block.length, serial_bus.PATIENCE_S)
             if answer is not None and not answer.refusal and len(answer.data) == block.length:
                 return block.decode(answer.data)
         raise _failure(servo, f"{block.items[0].name} cannot be read", answer)
 
     def read(self, servo: int, item: Item) -> int:
-        """Value of an item.
-
-        Raises DriverError: ``cannot-connect``: the servo does not answer; ``refused``: it has no such item.
-        """
+        """Value of an item. Raises DriverError: ``cannot-connect``: no answer; ``refused``: there is no such item."""
         return self.read_block(servo, Block(item.address, item.size, (item,)))[item.name]
 
     def write(self, servo: int, item: Item, value: int) -> None:
-        """Write an item and read it back.
-
-        Raises DriverError: ``cannot-connect``: the servo does not answer; ``refused``: it does not take the value.
-        """
+        """Write an item and read it back. Raises DriverError: ``cannot-connect``: no answer; ``refused``: not taken."""
         answer = None
-        for _ in range(ATTEMPTS):
+        for _ in range(serial_bus.ATTEMPTS):
             request = packets.encode_write(servo, item.address, item.encode(value))
-            answer = self._ask(servo, request, 0, PATIENCE_S)
+            answer = self._ask(servo, request, 0, serial_bus.PATIENCE_S)
             if answer is not None and answer.refusal:
                 raise _failure(servo, f"{item.name} = {value} is refused", answer)
             # A write whose answer was lost may have arrived: what counts is what the servo holds now.
@@ -182,8 +166,8 @@ class ServoBus(SerialServoBus[Status]):
 
     def clear_error(self, servo: int) -> None:
         """Let a servo of the Y series forget its error; whether it did is what its Error Code says."""
-        for _ in range(ATTEMPTS):
-            if self._ask(servo, packets.encode_clear_error(servo), 0, PATIENCE_S) is not None:
+        for _ in range(serial_bus.ATTEMPTS):
+            if self._ask(servo, packets.encode_clear_error(servo), 0, serial_bus.PATIENCE_S) is not None:
                 return
 
     def sync_write(self, items: Sequence[Item], values: Mapping[int, Sequence[int]]) -> None:
@@ -193,7 +177,7 @@ class ServoBus(SerialServoBus[Status]):
 
     def sync_read(
         self, servos: Sequence[int], block: Block, *, fast: bool = False, patience_s: float = 0.0, spare: int = 0
-    ) -> Answers[Status]:
+    ) -> serial_bus.Answers[Status]:
         """Read the same block of many servos.
 
         Nothing in an answer says to which question it belongs. Where an earlier one was not answered in time, as many

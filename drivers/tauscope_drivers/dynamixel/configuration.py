@@ -13,11 +13,7 @@ _KEYS = ("id", "model", "direction", "reduction", "zero_count", "milliampere_per
 
 @dataclass(frozen=True)
 class ServoConfiguration:
-    """One servo.
-
-    `torque_per_milliampere`: joint torque for one milliampere; None: the driver tracks positions, but neither limits
-        torque in newton metres nor commands it [Nm/mA or N/mA].
-    """
+    """One servo. `torque_per_milliampere`: None: torque is neither limited nor commanded [Nm/mA or N/mA]."""
 
     joint: str
     servo: int

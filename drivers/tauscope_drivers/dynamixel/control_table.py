@@ -168,12 +168,6 @@ class ServoModel:
         return "Present Current" in self.items and "Goal Current" in self.items
 
     @property
-    def paces_goals(self) -> bool:
-        """Whether Profile Velocity and Goal Position are neighbours, so that one write carries both."""
-        speed = self.items["Profile Velocity"]
-        return speed.address + speed.size == self.items["Goal Position"].address
-
-    @property
     def temperature_item(self) -> Item:
         """Temperature of the motor, or the only one it has."""
         return self.items.get("Present Motor Temperature") or self.items["Present Temperature"]
@@ -247,10 +241,7 @@ def describe_model(number: int) -> str:
 
 @cache
 def find_model(number: int, firmware: int = 0) -> ServoModel:
-    """The model of a number, with the table of its firmware.
-
-    Raises DriverError ``cannot-connect`` where no table is known for it.
-    """
+    """The model of a number, with the table of its firmware. Raises DriverError ``cannot-connect`` without a table."""
     if number in LEGACY_PRO:
         raise DriverError.no_connection(
             f"a servo is a {describe_model(number)}: its control table is another one; update its firmware to PRO(A) "
@@ -285,10 +276,7 @@ def find_model(number: int, firmware: int = 0) -> ServoModel:
 
 
 def find_model_by_name(name: str) -> ServoModel:
-    """The model of a name, with the table of its oldest firmware.
-
-    Raises DriverError ``refused`` where there is no such model.
-    """
+    """The model of a name, with its oldest firmware's table. Raises DriverError ``refused`` where there is none."""
     wanted = name.lower().replace("-", "_")
     for number, known in model_names().items():
         if wanted == known or wanted.startswith(f"{known}_"):

@@ -1,7 +1,7 @@
 """Looks at the servos of a port, moves nothing, writes nothing, and says what to do about what it finds."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 from tauscope_drivers.backend import ControlMode
@@ -15,7 +15,7 @@ from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, drive_mode, oper
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.dynamixel.session import Session, make_session, read_items, read_settings
 from tauscope_drivers.errors import DriverError, DriverErrorKind
-from tauscope_drivers.inspection import Finding, FoundDevice, Severity, failure
+from tauscope_drivers.inspection import Finding, Severity, failure
 from tauscope_drivers.limits import stated_limits
 from tauscope_drivers.serial_servos.bus import RETURN_DELAY_UNIT_S, SHORTEST_RETURN_DELAY_S
 from tauscope_drivers.serial_servos.doctor import examine_bus, measure_loop_rate, scan_bauds
@@ -25,14 +25,6 @@ _MOST_TURNS = 256  # Goal Position reaches this many turns both ways
 
 _EXAMINED = ("Torque Enable", "Bus Watchdog", *_SECONDARY)
 _LEAST_FIRMWARE = 45  # of the X series for Fast Sync Read and all bits of Drive Mode
-
-
-def examine(joints: Sequence[DriveJoint], *, slack_s: float = 0.002) -> list[Finding]:
-    """Port, adapter, and every servo that the robot file names.
-
-    Raises DriverError: ``refused``: a ``drive`` block is not valid.
-    """
-    return examine_bus(read_configuration(joints), ServoBus, _examine_servos, joints, slack_s)
 
 
 def _examine_servos(
@@ -169,10 +161,9 @@ def _examine_servo(servo: JointServo, settings: dict[str, int]) -> list[Finding]
 USUAL_BAUDS = (57_600, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 115_200, 4_500_000, 9_600)
 
 
-def scan_bus(path: str, bauds: Sequence[int] | None = None, *, slack_s: float = 0.002) -> Iterator[FoundDevice]:
-    """Every servo that answers a ping to all; see `scan_bauds`. `bauds`: None for the usual ones [bit/s]."""
-    return scan_bauds(path, USUAL_BAUDS if bauds is None else bauds, ServoBus, _list_servos, slack_s)
-
-
 def _list_servos(bus: ServoBus) -> list[tuple[int, str, str]]:
     return [(servo, describe_model(number), str(firmware)) for servo, (number, firmware) in bus.ping_all().items()]
+
+
+examine = partial(examine_bus, read_configuration, ServoBus, _examine_servos)
+scan_bus = partial(scan_bauds, USUAL_BAUDS, ServoBus, _list_servos)

@@ -31,13 +31,10 @@ _DELIVERED = {
 
 
 def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:
-    """Frames of a connection, of enabling, of some cycles and of a stop, for servos as delivered.
+    """Frames of a connection, of enabling, of some cycles and of a stop, for X series servos as delivered.
 
-    What only the servos themselves know is missing or assumed: their own current and PWM limits are those of an X
-    series servo, a status packet is never lost, and every servo knows Fast Sync Read. Raises DriverError: ``refused``:
-    a ``drive`` block, a limit or the watchdog's time is not possible.
-
-    `joints`: base first; each ``drive`` block has to name its model.
+    Every servo knows Fast Sync Read, and nothing is lost. Raises DriverError ``refused``. `joints`: base first; each
+    ``drive`` block has to name its model.
     """
     mode, limits, targets, cycle_s = request.mode, request.limits, request.targets, request.cycle_s
     configuration = read_configuration(joints)

@@ -67,11 +67,7 @@ def enable_servos(
 def plan_tasks(
     session: Session, mode: ControlMode, limits: DriveLimits, watchdog_s: float
 ) -> tuple[list[preparation.ServoTask], list[tuple[int, int]]]:
-    """Check everything that enabling needs, and plan it; only reads.
-
-    Raises DriverError: ``refused`` or ``cannot-connect``: names the joint. Returns one task a joint, and the lowest and
-    highest Goal Position of each [counts].
-    """
+    """Check and plan enabling, reading only: a task and the goals' range [counts] a joint. Raises DriverError."""
     steps = preparation.watchdog_steps(watchdog_s)
     present = [_present_position(session, joint) for joint in range(len(session.servos))]
     places = np.array([servo.units.position(count) for servo, count in zip(session.servos, present, strict=True)])

@@ -56,10 +56,7 @@ class ServoGroup:
             self._bus.sync_write(items, chosen)
 
     def write_goals(self, goals: Sequence[int], speeds: Sequence[int]) -> None:
-        """Write Goal Position of all servos, with Profile Velocity where that is its neighbour.
-
-        `goals`: one a joint [counts]; `speeds`: one a joint [units].
-        """
+        """Write all Goal Positions, with Profile Velocity where it is a neighbour; one a joint [counts], [units]."""
         for items, values in paced_goals(self.servos, goals, speeds):
             self._bus.sync_write(items, values)
 
@@ -171,14 +168,12 @@ def item_writes(
 def paced_goals(
     servos: Sequence[JointServo], goals: Sequence[int], speeds: Sequence[int]
 ) -> Iterator[tuple[list[Item], dict[int, list[int]]]]:
-    """Items and values of the Sync Writes of a cycle's goals, one a family.
-
-    `goals`: one a joint [counts]; `speeds`: one a joint [units].
-    """
+    """Items and values of a cycle's Sync Writes, one a family. `goals`, `speeds`: one a joint [counts], [units]."""
     for _, members in servo_families(servos):
         model = servos[members[0]].model
         goal, speed = model.items["Goal Position"], model.items["Profile Velocity"]
-        if model.paces_goals:
+        speed, goal = model.items["Profile Velocity"], model.items["Goal Position"]
+        if speed.address + speed.size == goal.address:  # one write carries both
             yield [speed, goal], {servos[index].servo: [speeds[index], goals[index]] for index in members}
         else:
             yield [goal], {servos[index].servo: [goals[index]] for index in members}

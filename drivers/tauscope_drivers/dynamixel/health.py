@@ -1,7 +1,4 @@
-"""What is known of each servo's health: its faults and whether it holds its joint.
-
-Group instructions hide it. The alert bit comes with every answer; registers are read one servo a cycle, in turn.
-"""
+"""What is known of each servo's health: alert bits come with every answer, registers of one servo a cycle, in turn."""
 
 from collections.abc import Mapping, Sequence
 

@@ -115,11 +115,7 @@ def encode_sync_write(values: Mapping[int, bytes], address: int) -> bytes:
 class DynamixelParser(FrameParser):
     """Finds whole frames in what comes from a port, whatever it is."""
 
-    header, fixed_bytes = HEADER, _FIXED_BYTES
-
-    def __init__(self, longest: int = LONGEST_FRAME) -> None:
-        """Begin with nothing. `longest`: longest frame that can be meant [bytes]."""
-        super().__init__(longest)
+    header, fixed_bytes, longest = HEADER, _FIXED_BYTES, LONGEST_FRAME
 
     @override
     def find_end(self, start: bytearray) -> int | None:

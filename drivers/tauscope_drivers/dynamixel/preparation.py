@@ -104,10 +104,7 @@ def taking_writes(servo: JointServo, task: ServoTask, *, holds: bool) -> list[Re
 
 
 def watchdog_steps(watchdog_s: float) -> int:
-    """Bus Watchdog for a time, at most that time.
-
-    Raises DriverError ``refused``: shorter or longer than the servos can.
-    """
+    """Bus Watchdog for at most a time. Raises DriverError ``refused``: shorter or longer than the servos can."""
     steps = math.floor(watchdog_s / WATCHDOG_STEP_S + _ROUNDING) if math.isfinite(watchdog_s) else 0
     if not 1 <= steps <= WATCHDOG_MOST:
         raise DriverError.refusal(
@@ -118,11 +115,7 @@ def watchdog_steps(watchdog_s: float) -> int:
 
 
 def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -> int:
-    """Most current within a torque limit, the robot file's limit and the servo's own Current Limit [units].
-
-    Raises DriverError ``refused`` where the limit cannot be turned into current, or leaves none.
-    `torque`: limit of the joint, infinite where there is none [Nm or N].
-    """
+    """Most current in all limits [units]. Raises DriverError ``refused``: none. `torque`: may be infinite [Nm or N]."""
     cap = settings["Current Limit"]
     stated_ma = servo.configuration.current_limit_ma
     if stated_ma is not None:
@@ -141,11 +134,7 @@ def current_cap(servo: JointServo, settings: Mapping[str, int], torque: float) -
 
 
 def velocity_cap(servo: JointServo, settings: Mapping[str, int], velocity: float) -> int:
-    """Profile Velocity within a speed limit and the servo's own Velocity Limit, beyond which it refuses it [units].
-
-    Raises DriverError ``refused`` where the servo's own limit leaves no motion.
-    `velocity`: limit of the joint, infinite where there is none [rad/s or m/s].
-    """
+    """Profile Velocity in both limits [units]. Raises DriverError ``refused``: none. `velocity`: may be infinite."""
     cap, own = servo.units.velocity_cap(velocity), settings.get("Velocity Limit")
     if own is None:
         return cap
@@ -157,10 +146,7 @@ def velocity_cap(servo: JointServo, settings: Mapping[str, int], velocity: float
 def position_counts(
     servo: JointServo, settings: Mapping[str, int], low: float, high: float, mode: ControlMode
 ) -> tuple[int, int]:
-    """Lowest and highest Goal Position within the joint's limits, and the servo's own where it applies them.
-
-    `low`, `high`: limits of the joint, infinite where there are none [rad or m].
-    """
+    """Lowest and highest Goal Position in limits, infinite where none [rad or m], and the servo's where it has them."""
     lowest, highest = servo.units.counts_within(low, high)
     if mode is ControlMode.POSITION and servo.model.family.position_mode not in _MULTI_TURN_MODES:
         return max(lowest, settings["Min Position Limit"]), min(highest, settings["Max Position Limit"])

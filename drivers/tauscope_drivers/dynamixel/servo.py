@@ -12,12 +12,10 @@ MULTI_TURN_COUNTS = 1_048_575  # Goal Position reaches this far both ways in the
 
 @dataclass(frozen=True)
 class ServoUnits:
-    """What one unit of a servo means at its joint.
+    """What one unit of a servo means at its joint, signed where it is mounted the other way round.
 
-    `radians_per_count`: joint position for one count, negative where the servo is mounted the other way round [rad or
-        m].
-    `torque_per_milliampere`: joint torque for one milliampere; None where the robot file does not say, for no maker's
-        figure exists [Nm/mA or N/mA].
+    `torque_per_milliampere`: of the joint; None where the robot file does not say: no maker's figure exists [Nm/mA or
+    N/mA].
     """
 
     radians_per_count: float
@@ -54,10 +52,7 @@ class ServoUnits:
         return round(position / self.radians_per_count) + self.zero_count
 
     def counts_within(self, low: float, high: float) -> tuple[int, int]:
-        """Lowest and highest whole count between two joint positions.
-
-        `low`, `high`: infinite where there is no limit [rad or m].
-        """
+        """Lowest and highest whole count between two positions, infinite where there is no limit [rad or m]."""
         ends = sorted((low / self.radians_per_count, high / self.radians_per_count))
         lowest = -MULTI_TURN_COUNTS if ends[0] == -math.inf else math.ceil(ends[0] - _ROUNDING) + self.zero_count
         highest = MULTI_TURN_COUNTS if ends[1] == math.inf else math.floor(ends[1] + _ROUNDING) + self.zero_count
@@ -68,10 +63,7 @@ class ServoUnits:
         return units * self.velocity_unit
 
     def velocity_cap(self, velocity: float) -> int:
-        """Profile Velocity for a largest speed; 0, which means none, where there is none.
-
-        `velocity`: positive, may be infinite [rad/s or m/s].
-        """
+        """Profile Velocity for a largest speed, which may be infinite [rad/s or m/s]; 0 means that there is none."""
         most = velocity / abs(self.velocity_unit)
         return 0 if most > _LARGEST_PROFILE else max(1, math.floor(most))
 
@@ -84,10 +76,7 @@ class ServoUnits:
         return round(torque / self._torque_per_unit())
 
     def current_cap(self, torque: float) -> int:
-        """Largest whole Goal Current within a torque limit; 0x7FFF where there is no limit.
-
-        `torque`: positive, may be infinite [Nm or N].
-        """
+        """Largest whole Goal Current within a torque limit [Nm or N]; 0x7FFF where that is infinite."""
         if torque == math.inf:
             return 0x7FFF
         return min(0x7FFF, math.floor(torque / abs(self._torque_per_unit()) + _ROUNDING))
@@ -129,12 +118,7 @@ class JointServo:
 
 
 def make_servo(number: int, configuration: ServoConfiguration, identity: tuple[int, int] | None) -> JointServo:
-    """A servo of a joint, with the identity that it stated, or without one as its configuration promises it.
-
-    Raises DriverError ``cannot-connect`` where not the model that the robot file names, one that senses no current or
-    has no watchdog.
-    `number`: of the joint, from 1.
-    """
+    """A servo with its stated identity, or the promised one. Raises DriverError ``cannot-connect``: unfit."""
     place = f"joint {configuration.joint} (servo {configuration.servo})"
     if identity is not None:
         model, firmware = find_model(*identity), identity[1]

@@ -1,7 +1,12 @@
-"""The servos of an arm as they were found on the bus, and what is done to one of them at a time."""
+"""The servos of an arm as they were found on the bus, and what they had in EEPROM before a run changed it."""
 
-from collections.abc import Iterable, Sequence
+import contextlib
+import json
+import os
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,17 +16,66 @@ from tauscope_drivers.dynamixel.configuration import ServoConfiguration
 from tauscope_drivers.dynamixel.control_table import CURRENT_MODE, gear_ratio_of
 from tauscope_drivers.dynamixel.group import ServoGroup
 from tauscope_drivers.dynamixel.health import Health
-from tauscope_drivers.dynamixel.original_settings import CHANGED, OriginalSettings
 from tauscope_drivers.dynamixel.preparation import ANSWERS_ALL, SETTINGS, RegisterWrite, commissioning_writes
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.errors import DriverError
-from tauscope_drivers.serial_servos.bus import (
-    FACTORY_RETURN_DELAY_S,
-    PATIENCE_S,
-    RETURN_DELAY_UNIT_S,
-    SHORTEST_RETURN_DELAY_S,
-    learn_latency,
-)
+from tauscope_drivers.serial_servos import bus as serial_bus
+
+# items in EEPROM that the driver changes, in the order in which they are put back: a mode resets others
+CHANGED = ("Drive Mode", "Return Delay Time", "Operating Mode")
+FOLDER = "TAUSCOPE_STATE"  # environment variable that names the folder, in place of ``~/.local/state/tauscope``
+
+
+class OriginalSettings:
+    """The settings of one servo on one port."""
+
+    def __init__(self, port: str, servo: int) -> None:
+        """Read what is kept; nothing is kept where the file is missing or damaged."""
+        name = f"{os.path.realpath(port).strip('/').replace('/', '-')}-{servo}.json"
+        self._path = _find_folder() / "servos" / name
+        self.before: dict[str, int] = {}  # value of each changed item before the first change
+        self._after: dict[str, int] = {}
+        try:
+            content = json.loads(self._path.read_text(encoding="utf-8"))
+            before, after = (
+                {item: int(value) for item, value in content[kind].items() if item in CHANGED}
+                for kind in ("before", "after")
+            )
+        except (OSError, ValueError, TypeError, KeyError, AttributeError):
+            return
+        if before.keys() == after.keys():
+            self.before, self._after = before, after
+
+    def check(self, present: Mapping[str, int]) -> None:
+        """Forget everything where an item is not as it was left: it is another servo, or somebody else set it."""
+        if any(present.get(name) != value for name, value in self._after.items()):
+            self.forget()
+
+    def remember(self, name: str, before: int, after: int) -> None:
+        """Keep a change; a disk that does not take it loses it, and the run goes on."""
+        self.before.setdefault(name, before)
+        self._after[name] = after
+        with contextlib.suppress(OSError):
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._path.write_text(json.dumps({"before": self.before, "after": self._after}), encoding="utf-8")
+
+    def forget(self) -> None:
+        """They are put back, or nobody's."""
+        self.before, self._after = {}, {}
+        with contextlib.suppress(OSError):
+            self._path.unlink(missing_ok=True)
+
+
+def _find_folder() -> Path:
+    """Where it is kept; an account without a home has the folder for temporary files."""
+    # systemd names the folder of a service, which has no other
+    if named := os.environ.get(FOLDER) or os.environ.get("STATE_DIRECTORY"):
+        return Path(named.partition(":")[0])
+    try:
+        return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "tauscope"
+    except RuntimeError:
+        return Path(tempfile.gettempdir()) / "tauscope"
+
 
 ELECTRONIC_GEAR = ("Electronic GearRatio Numerator", "Electronic GearRatio Denominator")
 
@@ -55,10 +109,7 @@ class Session:
             self.settings[joint][name] = value
 
     def restore(self) -> None:
-        """Put back what was changed in EEPROM, on servos without torque; others keep it until they are let go.
-
-        Raises DriverError where a servo does not answer, or does not take it.
-        """
+        """Put EEPROM back on servos without torque, later on others. Raises DriverError: it is not taken."""
         for joint, kept in enumerate(self.originals):
             before = kept.before
             if not before or self.read(joint, ["Torque Enable"])["Torque Enable"]:
@@ -98,11 +149,8 @@ class Session:
 
 
 def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) -> Session:
-    """Reach every servo, set what moves nothing, and read its health.
-
-    Raises DriverError ``cannot-connect`` where a servo is missing or of the wrong kind.
-    """
-    bus.return_delay_s = FACTORY_RETURN_DELAY_S
+    """Reach every servo, set what moves nothing, read its health. Raises DriverError ``cannot-connect``."""
+    bus.return_delay_s = serial_bus.FACTORY_RETURN_DELAY_S
     servos = tuple(_reach(bus, number, servo) for number, servo in enumerate(configurations, 1))
     session = make_session(bus, servos, [read_settings(bus, servo) for servo in servos])
     settings = session.settings
@@ -112,9 +160,9 @@ def open_session(bus: ServoBus, configurations: Sequence[ServoConfiguration]) ->
     for joint, servo in enumerate(servos):
         holds = bool(session.health.has_torque[joint])
         session.carry_out(joint, commissioning_writes(servo, settings[joint], holds=holds))
-    slowest = max(values["Return Delay Time"] for values in settings) * RETURN_DELAY_UNIT_S
-    bus.return_delay_s = max(SHORTEST_RETURN_DELAY_S, slowest)
-    learn_latency(bus.port, session.group.probe())
+    slowest = max(values["Return Delay Time"] for values in settings) * serial_bus.RETURN_DELAY_UNIT_S
+    bus.return_delay_s = max(serial_bus.SHORTEST_RETURN_DELAY_S, slowest)
+    serial_bus.learn_latency(bus.port, session.group.probe())
     return session
 
 
@@ -127,10 +175,7 @@ def make_session(bus: ServoBus, servos: Sequence[JointServo], settings: Sequence
 
 
 def read_settings(bus: ServoBus, servo: JointServo) -> dict[str, int]:
-    """Settings of a servo whose counts and speeds are those of its model's table.
-
-    Raises DriverError ``cannot-connect`` where it does not answer, or its gear is another one.
-    """
+    """Settings of a servo with its table's counts and speeds. Raises DriverError ``cannot-connect``: another gear."""
     settings, gear = read_items(bus, servo, SETTINGS), read_items(bus, servo, ELECTRONIC_GEAR)
     numerator, denominator = (gear.get(name, 1) for name in ELECTRONIC_GEAR)
     ratio = gear_ratio_of(servo.model.name)
@@ -164,6 +209,6 @@ def _reach(bus: ServoBus, number: int, configuration: ServoConfiguration) -> Joi
         )
     servo = make_servo(number, configuration, identity)
     level = servo.model.items["Status Return Level"]
-    if bus.read_once(servo.servo, level.address, level.size, PATIENCE_S) is None:  # it answers pings alone
+    if bus.read_once(servo.servo, level.address, level.size, serial_bus.PATIENCE_S) is None:  # it answers pings alone
         bus.sync_write([level], {servo.servo: [ANSWERS_ALL]})
     return servo

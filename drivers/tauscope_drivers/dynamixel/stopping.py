@@ -58,8 +58,7 @@ def clear_watchdogs(session: Session) -> None:
 def clear_errors(session: Session) -> None:
     """Clear errors of servos that forget them without a restart (Y), just as `clear_watchdogs` does.
 
-    What cannot be cleared, or comes back at once, stays in the servo's Error Code. Raises DriverError ``fault`` where a
-    servo holds, and its old goal is too far away; nothing was cleared.
+    What comes back stays in the servo's Error Code. Raises DriverError ``fault`` where an old goal is too far away.
     """
     stating = [
         joint

@@ -56,7 +56,7 @@ class FeetechArm(SerialServoArm[Session]):
         )
 
     def _open_session(self) -> Session:
-        session = open_session(FeetechBus(self._port, self._clock), self._configuration.servos)
+        session = open_session(FeetechBus(self._port, self.clock), self._configuration.servos)
         self._remarks = (_NO_WATCHDOG, *_describe_servos(session))
         return session
 
@@ -87,7 +87,7 @@ class FeetechArm(SerialServoArm[Session]):
         self._tasks = tasks
         if cycle_s is None:
             return None
-        return GoalPace(session.servos, held, [task.speed for task in tasks], cycle_s, self._clock.now_ns())
+        return GoalPace(session.servos, held, [task.speed for task in tasks], cycle_s, self.clock.now_ns())
 
     def _cycle(self, session: Session, mode: ControlMode, setpoint: Setpoint) -> ArmState:
         """Sync Write of the goals, Sync Read of all servos, torque and limits of one servo."""
@@ -97,7 +97,7 @@ class FeetechArm(SerialServoArm[Session]):
                 task.bound(servo.counts(place))
                 for task, servo, place in zip(self._tasks, session.servos, setpoint.position.tolist(), strict=True)
             ]
-            writes = goal_writes(goals, self._tasks, self._pace, self._clock.now_ns())
+            writes = goal_writes(goals, self._tasks, self._pace, self.clock.now_ns())
             session.bus.sync_write(
                 {servo: writes[joint] for joint, servo in enumerate(session.identifiers) if session.follows(joint)}
             )
@@ -113,7 +113,7 @@ class FeetechArm(SerialServoArm[Session]):
 
     def _notice_silence(self, session: Session) -> None:
         """Latch the fault where the host was silent for too long."""
-        silence_s = (self._clock.now_ns() - self._last_exchange_ns) * 1e-9
+        silence_s = (self.clock.now_ns() - self._last_exchange_ns) * 1e-9
         session.health.starved |= silence_s > self._watchdog_s
 
     def _read_state(self, session: Session, *, is_health_fresh: bool) -> ArmState:

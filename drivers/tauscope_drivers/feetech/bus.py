@@ -43,10 +43,7 @@ class FeetechBus(SerialServoBus[Status]):
         return sorted({status.servo for status in statuses if status is not None and not status.data})
 
     def read(self, servo: int, block: Block) -> tuple[int, dict[str, int]]:
-        """Alarms and registers of one servo, asked again while it does not answer.
-
-        Raises DriverError ``cannot-connect`` where it does not answer.
-        """
+        """Alarms and registers of one servo, asked repeatedly. Raises DriverError ``cannot-connect``: no answer."""
         for _ in range(ATTEMPTS):
             request = packets.encode_read(servo, block.address, block.length)
             answer = self._ask(servo, request, block.length, PATIENCE_S)
@@ -64,10 +61,7 @@ class FeetechBus(SerialServoBus[Status]):
         return None if owed else answer
 
     def write(self, servo: int, values: Mapping[str, int]) -> None:
-        """Write neighbouring registers of one servo's RAM and read them back.
-
-        Raises DriverError: ``cannot-connect``: it does not answer; ``refused``: it holds something else.
-        """
+        """Write neighbouring registers in RAM, read them back. Raises DriverError ``cannot-connect``, ``refused``."""
         address, data = encode_registers(values)
         for _ in range(ATTEMPTS):
             # A servo whose Response Status Level is 0 does not answer: the registers that it holds now count.
@@ -154,10 +148,7 @@ class FeetechBus(SerialServoBus[Status]):
 
 
 def encode_registers(values: Mapping[str, int]) -> tuple[int, bytes]:
-    """Address and bytes of neighbouring registers in RAM.
-
-    Raises ValueError where they are no neighbours, or lie in EEPROM.
-    """
+    """Address and bytes of neighbouring registers in RAM. Raises ValueError where they are none, or lie in EEPROM."""
     registers = [REGISTERS[name] for name in values]
     ends = [register.end for register in registers[:-1]]
     if registers[0].address < FIRST_IN_RAM or ends != [register.address for register in registers[1:]]:

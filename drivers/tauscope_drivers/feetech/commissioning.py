@@ -1,7 +1,4 @@
-"""Everything that a run writes or needs, looked at before: the same list refuses a run and fills doctor's findings.
-
-Nothing is written. Settings in EEPROM are never changed: the remedy names the register.
-"""
+"""Everything that a run needs, looked at before: it refuses a run and fills doctor's findings; writes nothing."""
 
 import math
 from collections.abc import Mapping
@@ -119,10 +116,7 @@ def rehearse(servo: JointServo, reading: Reading, limits: DriveLimits) -> list[F
 
 
 def find_doubts(servo: JointServo, reading: Reading, limits: DriveLimits, targets: Mapping[str, int]) -> list[Finding]:
-    """What a run can do with, said by doctor; the limits are those of this joint alone.
-
-    `targets`: the registers of `TARGETS`.
-    """
+    """What a run can do with, said by doctor. `limits`: of this joint alone; `targets`: the registers of `TARGETS`."""
     settings = reading.settings
     gains = ", ".join(f"{name} {settings[f'{name} Coefficient']}" for name in "PDI")
     volts = reading.feedback["Present Voltage"] * registers.VOLT

@@ -13,10 +13,7 @@ _KEYS = ("servo_id", "direction", "reduction", "zero_count")
 
 @dataclass(frozen=True)
 class ServoConfiguration:
-    """One servo.
-
-    `torque_per_permille`: joint torque for 1 ‰ of load; None: the data sheet's, at the present voltage [Nm or N].
-    """
+    """One servo. `torque_per_permille`: joint torque for 1 ‰ of load; None: by the data sheet [Nm or N]."""
 
     joint: str
     servo: int

@@ -1,6 +1,7 @@
 """Looks at the servos of a port, moves nothing, writes nothing, and says what to do about what it finds."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from functools import partial
 
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError
@@ -10,20 +11,12 @@ from tauscope_drivers.feetech.configuration import ServoConfiguration, read_conf
 from tauscope_drivers.feetech.registers import FEEDBACK, IDENTITY, describe_device
 from tauscope_drivers.feetech.servo import JointServo
 from tauscope_drivers.feetech.session import make_session, reach
-from tauscope_drivers.inspection import Finding, FoundDevice, failure
+from tauscope_drivers.inspection import Finding, failure
 from tauscope_drivers.limits import stated_limits
 from tauscope_drivers.serial_servos.doctor import examine_bus, measure_loop_rate, scan_bauds
 
 # rates that servos can be set to, the factory's first [bit/s]
 USUAL_BAUDS = (1_000_000, 500_000, 250_000, 128_000, 115_200, 57_600, 38_400)
-
-
-def examine(joints: Sequence[DriveJoint], *, slack_s: float = 0.002) -> list[Finding]:
-    """Port, adapter, and every servo that the robot file names.
-
-    Raises DriverError: ``refused``: a ``drive`` block is not valid.
-    """
-    return examine_bus(read_configuration(joints), FeetechBus, _examine_servos, joints, slack_s)
 
 
 def _examine_servos(
@@ -49,11 +42,6 @@ def _examine_servos(
     return [*findings, rate]
 
 
-def scan_bus(path: str, bauds: Sequence[int] | None = None, *, slack_s: float = 0.002) -> Iterator[FoundDevice]:
-    """Every servo that answers a ping to all; see `scan_bauds`. `bauds`: None for the usual ones [bit/s]."""
-    return scan_bauds(path, USUAL_BAUDS if bauds is None else bauds, FeetechBus, _list_servos, slack_s)
-
-
 def _list_servos(bus: FeetechBus) -> list[tuple[int, str, str]]:
     found = [(servo, bus.read(servo, IDENTITY)[1]) for servo in bus.ping_all()]
     return [
@@ -64,3 +52,7 @@ def _list_servos(bus: FeetechBus) -> list[tuple[int, str, str]]:
         )
         for servo, identity in found
     ]
+
+
+examine = partial(examine_bus, read_configuration, FeetechBus, _examine_servos)
+scan_bus = partial(scan_bauds, USUAL_BAUDS, FeetechBus, _list_servos)

@@ -24,10 +24,7 @@ _DELIVERED = Reading(
 
 
 def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator[PlannedFrame]:
-    """Frames of a connection, of enabling, of some cycles and of a stop, for servos as delivered.
-
-    Raises DriverError: ``refused``: a ``drive`` block, a limit or the mode is not possible.
-    """
+    """Frames of a connection, some cycles and a stop, for servos as delivered. Raises DriverError ``refused``."""
     if request.mode is not ControlMode.POSITION:
         raise DriverError.refusal(f"these servos cannot do mode {request.mode}; choose {ControlMode.POSITION}")
     servos = [JointServo(number, servo) for number, servo in enumerate(read_configuration(joints).servos, 1)]

@@ -41,13 +41,10 @@ def plan_tasks(session: Session, limits: DriveLimits) -> list[ServoTask]:
 
 
 def enable_servos(session: Session, tasks: Sequence[ServoTask]) -> list[int]:
-    """Give each servo its limits and its place for a goal, then torque, one servo after the other.
+    """Give each servo its limits and its place for a goal, then torque, one after the other; their goals [counts].
 
-    An arm may fall meanwhile: each servo is asked for its place at the last moment, and catches its joint there. Where
-    one fails, those that had no torque before are let go again. Raises DriverError where a servo does not answer, or
-    does not take what it is told.
-
-    Returns list of int: Goal Position of each servo [counts].
+    Each is asked for its place at the last moment: an arm may fall. Where one fails, those that had no torque are let
+    go. Raises DriverError.
     """
     held_before = session.health.has_torque.copy()
     reached: list[int] = []
@@ -66,10 +63,7 @@ def enable_servos(session: Session, tasks: Sequence[ServoTask]) -> list[int]:
 
 
 def taking_writes(task: ServoTask, present: int, goal: int | None) -> list[dict[str, int]]:
-    """Registers that take a servo under power, in their order.
-
-    `present`: Present Position [counts]; `goal`: Goal Position of a servo that holds its joint already [counts].
-    """
+    """Registers that take a servo under power. `present`, `goal`: place, and goal where it holds already [counts]."""
     place = goal if goal is not None and _is_near(goal, present) else present
     target = {"Acceleration": FREE_ACCELERATION, "Goal Position": place, "Goal Time": 0}
     writes = [target | {"Goal Speed": task.speed, "Torque Limit": task.torque}]
@@ -91,10 +85,7 @@ def _take(session: Session, joint: int, task: ServoTask) -> int:
 def goal_writes(
     goals: Sequence[int], tasks: Sequence[ServoTask], pace: GoalPace | None, now_ns: int
 ) -> list[dict[str, int]]:
-    """Registers of a cycle, one servo each: its goal, and the speed that takes until the next.
-
-    `goals`: one a joint [counts]; `pace`: None: servos leap at the speed limit.
-    """
+    """Registers of a cycle, one servo each. `goals`: [counts]; `pace`: None: servos leap at the speed limit."""
     speeds = [task.speed for task in tasks] if pace is None else pace.speeds(goals, now_ns)
     return [
         {"Goal Position": goal, "Goal Time": 0, "Goal Speed": speed} for goal, speed in zip(goals, speeds, strict=True)

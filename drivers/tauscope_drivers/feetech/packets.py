@@ -64,10 +64,7 @@ def encode_sync_read(servos: Sequence[int], address: int, length: int) -> bytes:
 
 
 def encode_sync_write(values: Mapping[int, bytes], address: int) -> bytes:
-    """Write the same stretch of many servos; none of them answers.
-
-    Raises ValueError where the servos get different numbers of bytes.
-    """
+    """Write the same stretch of many servos; none answers. Raises ValueError where their lengths differ."""
     length = len(next(iter(values.values())))
     if any(len(data) != length for data in values.values()):
         raise ValueError("a Sync Write carries the same number of bytes to every servo")
@@ -78,10 +75,7 @@ def encode_sync_write(values: Mapping[int, bytes], address: int) -> bytes:
 class FeetechParser(FrameParser):
     """Finds whole frames in what comes from a port."""
 
-    header, fixed_bytes = HEADER, _FIXED_BYTES
-
-    def __init__(self, longest: int = LONGEST_FRAME) -> None:
-        super().__init__(longest)
+    header, fixed_bytes, longest = HEADER, _FIXED_BYTES, LONGEST_FRAME
 
     @override
     def find_end(self, start: bytearray) -> int | None:

@@ -41,10 +41,7 @@ class JointServo:
         return round(position * self._counts_per_unit) + self.configuration.zero_count
 
     def counts_within(self, low: float, high: float) -> tuple[int, int]:
-        """Lowest and highest count of one turn between two joint positions.
-
-        `low`, `high`: infinite where there is no limit [rad or m].
-        """
+        """Lowest and highest count of one turn between two positions, infinite where there is no limit [rad or m]."""
         ends = sorted((low * self._counts_per_unit, high * self._counts_per_unit))
         zero = self.configuration.zero_count
         lowest = 0 if ends[0] == -math.inf else max(0, math.ceil(ends[0] - _ROUNDING) + zero)
@@ -56,10 +53,7 @@ class JointServo:
         return units * self.counts_per_speed_unit / self._counts_per_unit
 
     def goal_speed(self, velocity: float) -> int:
-        """Goal Speed for a largest joint speed; one at least, for 0 may mean no limit.
-
-        `velocity`: positive, may be infinite [rad/s or m/s].
-        """
+        """Goal Speed for a largest speed, which may be infinite [rad/s or m/s]; 1 at least: 0 may mean no limit."""
         most = velocity * abs(self._counts_per_unit) / self.counts_per_speed_unit
         return int(min(registers.LARGEST_SPEED, max(1.0, most)))
 
@@ -75,10 +69,7 @@ class JointServo:
         return registers.TORQUE_PER_VOLT * voltage * registers.VOLT / registers.PERMILLE * self.configuration.reduction
 
     def torque_limit(self, torque: float, voltage: int) -> int:
-        """Torque Limit for a largest joint torque, full duty where there is no limit.
-
-        `torque`: positive, may be infinite [Nm or N]; `voltage`: Present Voltage [0.1 V].
-        """
+        """Torque Limit for a largest torque, which may be infinite [Nm or N]. `voltage`: Present Voltage [0.1 V]."""
         unit = self.torque_per_permille(voltage)
         if torque == math.inf or unit == 0.0:
             return registers.PERMILLE

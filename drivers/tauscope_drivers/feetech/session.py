@@ -34,10 +34,7 @@ _BITS: tuple[tuple[int, str, str, str], ...] = (
 
 
 def alarm_faults(alarms: int, joint: int) -> tuple[Fault, ...]:
-    """Faults that a servo's alarms state; empty for 0.
-
-    `alarms`: bits of the register Status, which every answer carries; `joint`: number of the joint, from 1.
-    """
+    """Faults that alarms state; empty for 0. `alarms`: the register Status, as every answer has it; `joint`: from 1."""
     found = tuple(
         Fault(code, joint, f"{meaning}, Status 0x{alarms:02X}", remedy)
         for bit, code, meaning, remedy in _BITS
@@ -90,10 +87,7 @@ class Health:
 
 @dataclass
 class Session:
-    """An arm's servos, reached.
-
-    `unsure`: joints whose servo has missed an answer since its torque and limits were read: it may have restarted.
-    """
+    """An arm's servos, reached. `unsure`: joints whose servo missed an answer since its limits were read."""
 
     bus: FeetechBus
     servos: tuple[JointServo, ...]
@@ -161,10 +155,7 @@ def naming(servo: JointServo) -> Iterator[None]:
 
 
 def open_session(bus: FeetechBus, configurations: Sequence[ServoConfiguration]) -> Session:
-    """Reach every servo and read it; nothing is written.
-
-    Raises DriverError ``cannot-connect`` where a servo is missing or of the wrong kind.
-    """
+    """Reach every servo and read it, no more. Raises DriverError ``cannot-connect``: missing, or of the wrong kind."""
     found = [reach(bus, number, servo) for number, servo in enumerate(configurations, 1)]
     session = make_session(bus, found)
     answers = [bus.sync_read(session.identifiers, registers.FEEDBACK, PATIENCE_S) for _ in range(_PROBES)]
@@ -184,10 +175,7 @@ def make_session(bus: FeetechBus, found: Sequence[tuple[JointServo, dict[str, in
 
 
 def reach(bus: FeetechBus, number: int, configuration: ServoConfiguration) -> tuple[JointServo, dict[str, int]]:
-    """A servo and its EEPROM.
-
-    Raises DriverError ``cannot-connect`` where it does not answer, or is none that this driver knows.
-    """
+    """A servo and its EEPROM. Raises DriverError ``cannot-connect`` where it does not answer, or is of another kind."""
     servo = JointServo(number, configuration)
     if not bus.ping(servo.servo):
         raise DriverError.no_connection(

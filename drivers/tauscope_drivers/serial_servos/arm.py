@@ -25,7 +25,7 @@ class SerialServoArm(ABC, Generic[_Session]):
     def __init__(self, configuration: BusConfiguration[Any], slack_s: float, clock: Clock | None) -> None:
         """Nothing is opened yet. `slack_s`: how much longer than the bus takes an answer is waited for [s]."""
         self._configuration = configuration
-        self._clock = MonotonicClock() if clock is None else clock
+        self.clock = MonotonicClock() if clock is None else clock
         self._port = SerialPort(configuration.port, configuration.baud, slack_s)
         self._session: _Session | None = None
         self._mode: ControlMode | None = None
@@ -40,21 +40,12 @@ class SerialServoArm(ABC, Generic[_Session]):
     def capabilities(self) -> Capabilities:
         """What these servos can do; the rate is exact once they are reached."""
 
-    @property
-    def clock(self) -> Clock:
-        """The machine's monotonic clock, where no other was given."""
-        return self._clock
-
     def require_rate(self, rate_hz: float) -> None:
         """Refuse a rate that the bus does not carry. Raises DriverError ``refused``, which names what limits it."""
         require_rate(rate_hz, *self._budget())
 
     def connect(self) -> ArmState:
-        """Lock the port and reach every servo; moves nothing and switches no torque on.
-
-        Raises DriverError ``cannot-connect``: connected already, the port is taken or missing, a servo is missing or of
-        the wrong kind.
-        """
+        """Lock the port, reach every servo; moves nothing. Raises DriverError ``cannot-connect``: why."""
         if self._session is not None:
             raise DriverError.no_connection("the arm is connected already; disconnect it first")
         self._lost = ()
@@ -67,10 +58,7 @@ class SerialServoArm(ABC, Generic[_Session]):
         return self._observe(self._session, is_health_fresh=True)
 
     def acknowledge_faults(self) -> ArmState:
-        """Forget faults whose cause is gone; an arm that is still enabled is stopped by its policy first.
-
-        Raises DriverError: ``not-connected``, or ``fault`` where a fault stays.
-        """
+        """Forget faults whose cause is gone; stops the arm. Raises DriverError ``not-connected`` or ``fault``."""
         session = self._require_session()
         with self._watching_the_port():
             if self._mode is not None:
@@ -86,11 +74,10 @@ class SerialServoArm(ABC, Generic[_Session]):
         watchdog_s: float,
         cycle_s: float | None = None,
     ) -> ArmState:
-        """Take the arm under power where it stands.
+        """Take the arm under power where it stands. Raises DriverError: ``not-connected``, ``refused`` or ``fault``.
 
-        Raises DriverError: ``not-connected``, ``refused`` or ``fault``.
-        `watchdog_s`: longest silence of the host [s]; `cycle_s`: time between two goals, over which the servos go from
-        one to the next; they leap where it is None, or too short for a bus that has to carry the speeds as well [s].
+        `watchdog_s`: longest silence of the host; `cycle_s`: between goals; servos leap where it is None, or too short
+        for the bus [s].
         """
         session = self._require_session()
         if self._mode is not None:
@@ -101,21 +88,18 @@ class SerialServoArm(ABC, Generic[_Session]):
             _require_none(self._read_faults(session))
             self._pace = self._take_under_power(session, mode, limits, watchdog_s, cycle_s)
         self._mode, self._policy, self._watchdog_s = mode, stop_policy, watchdog_s
-        self._last_exchange_ns = self._clock.now_ns()
+        self._last_exchange_ns = self.clock.now_ns()
         return self._observe(session, is_health_fresh=True)
 
     def exchange(self, setpoint: Setpoint) -> ArmState:
-        """One cycle: goals out, the state of all servos in, and a piece of one servo's health.
-
-        Raises DriverError: ``not-enabled``, ``refused`` (nothing is sent), or ``lost``.
-        """
+        """One cycle. Raises DriverError: ``not-enabled``, ``refused`` (nothing is sent), or ``lost``."""
         session = self._require_session()
         if self._mode is None:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the arm is not enabled; enable it first")
         require_finite(setpoint, len(self._configuration.servos))
         with self._watching_the_port():
             state = self._cycle(session, self._mode, setpoint)
-        self._last_exchange_ns = self._clock.now_ns()
+        self._last_exchange_ns = self.clock.now_ns()
         return state
 
     def stop(self, policy: StopPolicy) -> ArmState:
@@ -188,7 +172,7 @@ class SerialServoArm(ABC, Generic[_Session]):
             return self._read_state(session, is_health_fresh=is_health_fresh)
 
     def _blind(self) -> ArmState:
-        return ArmState.unknown(self._clock.now_ns(), len(self._configuration.servos), self._lost)
+        return ArmState.unknown(self.clock.now_ns(), len(self._configuration.servos), self._lost)
 
     def _require_session(self) -> _Session:
         if self._session is None:
@@ -211,10 +195,7 @@ class SerialServoArm(ABC, Generic[_Session]):
 
 
 def act_on_each(joints: Iterable[int], act: Callable[[int], None], let_go: Callable[[int], None] | None = None) -> None:
-    """Do something to every servo, also after one that failed; the first failure is raised at the end.
-
-    `let_go`: what is done to one that failed.
-    """
+    """Act on every servo, also after one that failed, which is `let_go`; the first failure is raised at the end."""
     failure: DriverError | None = None
     for joint in joints:
         try:

@@ -51,10 +51,7 @@ def largest_rate_hz(traffic: CycleTraffic, timing: BusTiming, load: float = LARG
 
 
 def require_rate(rate_hz: float, traffic: CycleTraffic, timing: BusTiming) -> None:
-    """Refuse a rate that the bus does not carry, and say what limits it.
-
-    Raises DriverError ``refused``, which names the limit and the rate that is possible.
-    """
+    """Refuse a rate that the bus does not carry. Raises DriverError ``refused``: what limits it, what is possible."""
     most = largest_rate_hz(traffic, timing)
     if rate_hz <= most:
         return
@@ -98,14 +95,12 @@ class FrameParser(ABC):
 
     header: bytes
     fixed_bytes: int  # bytes from which a frame's end is known
+    longest: int  # frames that say to be longer are noise [bytes]
 
-    def __init__(self, longest: int) -> None:
-        """Begin with nothing.
-
-        `longest`: longest frame that can be meant, so that a damaged length does not swallow what follows [bytes].
-        """
+    def __init__(self, longest: int | None = None) -> None:
+        """Begin with nothing. `longest`: longest frame that is believed: a damaged length swallows no more [bytes]."""
         self.discarded = 0
-        self.longest = longest
+        self.longest = longest or self.longest
         self._buffer = bytearray()
 
     @abstractmethod

@@ -30,11 +30,7 @@ def read_bus(
     bauds: tuple[int, int],
     device: str,
 ) -> BusConfiguration[_Servo]:
-    """Bus and servos of an arm.
-
-    Raises DriverError ``refused`` where a key is missing, unknown or not usable; names the joint and the key.
-    `keys`: of a joint's block, that of its ID first; `bauds`: lowest and highest rate [bit/s]; `device`: as an example.
-    """
+    """Bus and servos of an arm. Raises DriverError ``refused``: names joint and key. `keys`: that of the ID first."""
     require_known_keys(joints, ("port", "baud"), keys)
     servos = tuple(read_servo(joint) for joint in joints)
     require_distinct(joints, keys[0])
@@ -43,10 +39,7 @@ def read_bus(
 
 
 def read_torque_constant(joint: DriveJoint) -> float | None:
-    """Joint torque for one unit that the servo measures; None where the robot file does not say [Nm or N].
-
-    Raises DriverError ``refused`` where it is zero or no number.
-    """
+    """Joint torque for one unit that is measured, None where not said [Nm or N]. Raises DriverError ``refused``."""
     constant = joint.torque_per_unit
     if constant is not None and (not math.isfinite(constant) or constant == 0.0):
         raise DriverError.refusal(f"joint {joint.name}: torque_constant = {constant}; give one that is not zero")

@@ -25,13 +25,15 @@ _Bus = TypeVar("_Bus", bound=SerialServoBus[Any])
 
 
 def examine_bus(
-    configuration: BusConfiguration[_Servo],
+    read_configuration: Callable[[Sequence[DriveJoint]], BusConfiguration[_Servo]],
     make_bus: Callable[[SerialPort], _Bus],
     examine_servos: Callable[[_Bus, Sequence[_Servo], Sequence[DriveJoint]], list[Finding]],
     joints: Sequence[DriveJoint],
-    slack_s: float,
+    *,
+    slack_s: float = 0.002,
 ) -> list[Finding]:
-    """Port, adapter, and every servo that the robot file names."""
+    """Port, adapter, and every servo of the robot file. Raises DriverError ``refused``: an invalid block."""
+    configuration = read_configuration(joints)
     port = SerialPort(configuration.port, configuration.baud, slack_s)
     try:
         port.open()
@@ -47,10 +49,7 @@ def examine_bus(
 def measure_loop_rate(
     bus: SerialServoBus[Any], ask: Callable[[], Answers[Any]], traffic: CycleTraffic, return_delay_s: float
 ) -> Finding:
-    """How often all servos can be read, measured, beside what a whole cycle allows.
-
-    `ask`: reads all servos once; `return_delay_s`: of a run [s].
-    """
+    """How often all servos can be read, beside what a cycle allows. `ask`: reads all once; `return_delay_s`: [s]."""
     begin_ns = time.monotonic_ns()
     missed = sum(traffic.servos - len(ask().statuses) for _ in range(MEASURED_CYCLES))
     rate_hz = MEASURED_CYCLES / ((time.monotonic_ns() - begin_ns) * 1e-9)
@@ -65,18 +64,16 @@ def measure_loop_rate(
 
 
 def scan_bauds(
-    path: str,
-    bauds: Sequence[int],
+    usual: Sequence[int],
     make_bus: Callable[[SerialPort], _Bus],
     list_servos: Callable[[_Bus], list[tuple[int, str, str]]],
-    slack_s: float,
+    path: str,
+    bauds: Sequence[int] | None = None,
+    *,
+    slack_s: float = 0.002,
 ) -> Iterator[FoundDevice]:
-    """Every servo that answers a ping to all, one baud rate after the other; about a second each.
-
-    Raises DriverError ``cannot-connect`` where the port is missing, not permitted or taken.
-    `bauds`: [bit/s]; `list_servos`: ID, model and firmware of each.
-    """
-    for baud in bauds:
+    """Who answers a ping to all at each of `bauds`, or the `usual` ones. Raises DriverError ``cannot-connect``."""
+    for baud in bauds or usual:
         port = SerialPort(path, baud, slack_s)
         port.open()
         try:

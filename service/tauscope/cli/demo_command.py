@@ -35,7 +35,7 @@ from tauscope.robot import Robot, read_robot
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.states import RunState
 from tauscope.server.control.campaign import CampaignOrder, CampaignWorkspace
-from tauscope.server.http.campaigns import CAMPAIGNS, result_of
+from tauscope.server.http.campaigns import CAMPAIGNS, get_result
 from tauscope.server.http.services import Services, open_services
 from tauscope.server.http.settings import Settings
 from tauscope.server.queue.job_folder import JobState
@@ -206,7 +206,6 @@ def _show_findings(console: Console, found: DiagnosisDocument) -> None:
     console.print()
 
 
-ROOT = "/api/v1"
 POLL_S = 0.2
 MOTION = ExcitationDesignOptions(starts=1, periods=2, slow_postures=1, closing_period=False)
 
@@ -216,7 +215,7 @@ def run_campaign(data: Path, robot_file: Path, scenario: Mapping[str, Any], told
     with open_services(Settings(data_folder=data)) as services:
         identifier = _begin(services, robot_file, scenario)
         _wait_for_end(services, identifier, told)
-        found = result_of(services, identifier, ROOT).diagnosis
+        found = get_result(identifier, services).diagnosis
     if found is None:
         raise TauscopeError("the demo's campaign made no diagnosis; run the demo again")
     return found
@@ -242,7 +241,7 @@ def _begin(services: Services, robot_file: Path, scenario: Mapping[str, Any]) ->
 def _wait_for_end(services: Services, identifier: str, told: Told) -> None:
     """Wait as long as it takes: the arm's time is virtual."""
     while True:
-        answer = CAMPAIGNS.describe(services, identifier, ROOT)
+        answer = CAMPAIGNS.describe(services, identifier)
         if answer.state == "damaged" or JobState(answer.state).is_end:
             break
         going = [step.name for step in answer.steps if step.state not in ("waiting", "succeeded", "finished")]

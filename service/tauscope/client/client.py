@@ -153,12 +153,7 @@ class Client:
         return self._create("campaigns", CampaignAnswer, content, _lease_header(lease))
 
     def wait(self, item: Followed, timeout_s: float | None = None, lease: HeldLease | None = None) -> Followed:
-        """Wait until a job, run or campaign has ended.
-
-        Raises TimeoutError if it has not ended by then.
-
-        `timeout_s`: how long; for good where None [s].
-        """
+        """Wait until a job, run or campaign has ended, or raise TimeoutError. `timeout_s`: for good where None [s]."""
         last = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
             item = _parse(self._transport.send("GET", item.links.self_), type(item))
@@ -183,10 +178,7 @@ class Client:
             time.sleep(POLL_S)
 
     def lease(self, robot: str, *, backend: str | None = None, ttl_s: float = 10.0, take: bool = False) -> HeldLease:
-        """Take an arm; use the result as a context, within which it is kept.
-
-        `ttl_s`: time after which the arm stops when this program is gone [s].
-        """
+        """Take an arm; the lease is kept within the context. `ttl_s`: until it stops when this program is gone [s]."""
         wanted = {"robot": robot, "backend": backend, "ttl_s": ttl_s, "take": take}
         taken = self._create("leases", LeaseAnswer, json_content(wanted))
         headers = {"Lease-Token": taken.token or ""}

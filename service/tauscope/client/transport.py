@@ -37,12 +37,7 @@ class Transport:
     """One service; every request has a connection of its own, so that threads never wait for each other."""
 
     def __init__(self, url: str, key: str | None, timeout_s: float, ca_file: Path | None = None) -> None:
-        """Prepare; nothing is sent yet.
-
-        Raises ValueError if that is no address, or a key would go over the network in clear.
-
-        `timeout_s`: how long each step of a request may take [s].
-        """
+        """Nothing is sent yet. Raises ValueError: no address, or a key in clear. `timeout_s`: of each step [s]."""
         parts = urlsplit(url)
         if parts.scheme not in ("http", "https") or not parts.hostname or parts.path.strip("/") or parts.query:
             raise ValueError(f"{url}: no address of a service; give scheme, host and port only")
@@ -55,10 +50,7 @@ class Transport:
     def send(
         self, method: str, path: str, *, headers: Mapping[str, str] | None = None, content: "Content | None" = None
     ) -> Answer:
-        """Make a request, and wait for its answer.
-
-        Raises ApiError where the problem that the service answered with, or that it did not answer.
-        """
+        """Make a request, and wait for its answer. Raises ApiError: the service's problem, or that it is silent."""
         body = content or Content("", (), 0)
         sent = {**self._headers, "Content-Length": str(body.length), **(headers or {})}
         if body.media_type:
@@ -112,11 +104,7 @@ def json_content(document: Any) -> Content:
 
 
 def form_content(document: Any, files: Sequence[tuple[str, Path]]) -> Content:
-    """A form of a JSON part and files.
-
-    `document`: for the part ``request``; None for a form without it; `files`: sequence of (str, Path), name of the
-    part, and the file.
-    """
+    """A form of a JSON part ``request``, None without one, and of files: the part's name, and the file."""
     boundary = uuid.uuid4().hex
     parts: list[bytes | Path] = []
     if document is not None:

@@ -14,19 +14,10 @@ from typing import Any
 
 from tauscope.errors import AcquisitionError, TauscopeError
 from tauscope.robot import read_robot
+from tauscope.runtime import record as records
 from tauscope.runtime.drivers import Connection, make_backend
 from tauscope.runtime.loop import end_event
 from tauscope.runtime.options import RunOrder, read_order
-from tauscope.runtime.record import (
-    FLUSH_S,
-    STOP_FILE,
-    ProcessName,
-    RecordKeeper,
-    RunLock,
-    RunProblem,
-    RunRecord,
-    read_record,
-)
 from tauscope.runtime.run import OpenRecorder, Run, RunTask, Surroundings, open_recorder
 from tauscope.runtime.states import RunState
 from tauscope.runtime.stop_listener import StopListener
@@ -40,16 +31,16 @@ def control(
 ) -> int:
     report = _event_pipe()
     try:
-        lock = RunLock(folder)
-        order, record = read_order(folder), read_record(folder)
+        lock = records.RunLock(folder)
+        order, record = read_order(folder), records.read_record(folder)
         if record.state is not RunState.CREATED:
             raise AcquisitionError(f"{folder}: the run is {record.state} already; a run is carried out once")
     except TauscopeError as error:
         sys.stderr.write(f"{error}\n")
         return 1
-    stops = StopListener(sys.stdin.fileno(), folder / STOP_FILE, order.options.heartbeat_s)
-    keeper = RecordKeeper(folder)
-    record = record.model_copy(update={"control": ProcessName.of(os.getpid())})
+    stops = StopListener(sys.stdin.fileno(), folder / records.STOP_FILE, order.options.heartbeat_s)
+    keeper = records.RecordKeeper(folder)
+    record = record.model_copy(update={"control": records.ProcessName.of(os.getpid())})
     keeper.keep(record)
     try:
         task = _task(order, folder, make)
@@ -61,7 +52,7 @@ def control(
         report(end_event(record))
     else:
         run.execute()
-    unkept = keeper.close(FLUSH_S if stops.is_real_time else threading.TIMEOUT_MAX)
+    unkept = keeper.close(records.FLUSH_S if stops.is_real_time else threading.TIMEOUT_MAX)
     if unkept is not None:
         sys.stderr.write(f"{unkept}\n")
     lock.release()
@@ -75,8 +66,8 @@ def _task(order: RunOrder, folder: Path, make: Callable[..., Connection]) -> Run
     return RunTask(robot, trajectory, order.options, lambda: make(name, robot, settings, folder=folder))
 
 
-def _refuse(record: RunRecord, error: TauscopeError) -> RunRecord:
-    problem = RunProblem(code=error.code, detail=str(error))
+def _refuse(record: records.RunRecord, error: TauscopeError) -> records.RunRecord:
+    problem = records.RunProblem(code=error.code, detail=str(error))
     return record.moved(RunState.STOPPING, problem=problem).moved(RunState.FAILED)
 
 

@@ -60,10 +60,7 @@ _ROOM = 1.05
 
 @dataclass(frozen=True, eq=False)
 class GuardLimits:
-    """Limits of every joint; infinite where there is none.
-
-    `position_low`, `position_high`: (n,), range of the targets [rad or m].
-    """
+    """Limits of every joint; infinite where there is none. `position_low`, `position_high`: (n,) [rad or m]."""
 
     joints: tuple[str, ...]
     units: tuple[str, ...]
@@ -91,10 +88,8 @@ def guard_limits(
 ) -> GuardLimits:
     """The limits of a run: the robot file's where it states them, else a careful default or what the motion needs.
 
-    `low`, `high`: (n,), range of the motion's positions [rad or m].
-    `speed`: (n,), the motion's largest speed [rad/s or m/s].
-    `following`: following error allowed at every joint; the defaults where None [rad or m].
-    `temperature_c`: hottest motor [°C].
+    `low`, `high`, `speed`: (n,), of the motion [rad or m, and per s]; `following`: of every joint; `temperature_c`:
+    [°C].
     """
     limits, joints = motion_limits(robot), robot.joints
     has_range = np.array([joint.limits.position is not None for joint in joints])
@@ -136,13 +131,7 @@ class Guard:
         stale_misses: int = 3,
         stale_s: float = 0.05,
     ) -> None:
-        """Prepare for the first command.
-
-        `period_s`: nominal time between commands [s].
-        `watchdog_s`: time without a command after which the device stops by itself [s].
-        `enabled_ns`: when the arm was enabled, which started that time [ns].
-        `stale_s`: time after which a joint that does not answer counts as lost, if that is sooner [s].
-        """
+        """`period_s`: between commands; `watchdog_s`: the device's; `enabled_ns`: when; `stale_s`: at most so long."""
         self.stale = np.zeros(len(limits.joints), dtype=np.int64)
         self._limits = limits
         self._period_s, self._watchdog_s = period_s, watchdog_s
@@ -157,12 +146,7 @@ class Guard:
         self._violation: Violation | None = None
 
     def check(self, state: ArmState, setpoint: Setpoint, now_ns: int, due_ns: int) -> Violation | None:
-        """Judge a command before it is sent.
-
-        `now_ns`: the present instant by the backend's clock [ns].
-        `due_ns`: when the command was to be sent; commands' speeds are judged by these instants, not by jitter [ns].
-        Returns Violation or None: None where the command may be sent.
-        """
+        """Judge a command before it is sent. `now_ns`: now; `due_ns`: when it was due, by which speeds are judged."""
         if self._violation is None:
             with np.errstate(all="ignore"):  # absurd commands overflow, and are refused
                 self._violation = (

@@ -21,12 +21,9 @@ _MOST_POSTURES = 100_000
 
 
 def predict_torque(robot: Robot, position: Array, velocity: Array, acceleration: Array) -> Array | None:
-    """Joint torque of the model, τ = H(q) q̈ + h(q, q̇) + c(q) + τ_f(q̇); None where the robot file has no model.
+    """τ = H(q) q̈ + h(q, q̇) + c(q) + τ_f(q̇), (N, n) [Nm or N], without unstated friction; None without a model.
 
-    Friction is left out where its coefficients or its shape are not stated.
-
-    `position`, `velocity`, `acceleration`: (N, n), the motion [rad or m, and per s, per s²]. Returns (N, n) or None [Nm
-    or N].
+    `position`, `velocity`, `acceleration`: (N, n), the motion [rad or m, and per s, per s²].
     """
     parameters = _parameters(robot)
     if parameters is None:
@@ -40,11 +37,7 @@ def predict_torque(robot: Robot, position: Array, velocity: Array, acceleration:
 
 
 def compute_inertia(robot: Robot, position: Array) -> tuple[Array, int] | None:
-    """Joint-space inertia H along a motion; None where the robot file has no model.
-
-    `position`: (N, n), the motion [rad or m]. Returns (K, n, n) and int, or None, H at every s-th posture, and s: so
-    many that memory stays small [kg m², kg m, kg].
-    """
+    """H, (K, n, n), at every s-th `position`, (N, n), of a motion, and s; None without a model [kg m², kg m, kg]."""
     parameters = _parameters(robot)
     if parameters is None:
         return None
@@ -64,11 +57,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Targets of every cycle, from where the arm stands to the end of the motion.
-
-    `period_ns`: time between cycles [ns].
-    `position`, `velocity`: (N, n), targets [rad or m, and per s].
-    """
+    """Targets of every cycle, the ramp's first: (N, n) [rad or m, and per s]. `period_ns`: of a cycle [ns]."""
 
     rate_hz: float  # cycles a second [Hz]
     period_ns: int
@@ -101,12 +90,7 @@ class Plan:
 def make_plan(
     robot: Robot, trajectory: Trajectory, start: Array, options: RunOptions, capabilities: Capabilities
 ) -> Plan:
-    """Plan a run: a minimum-jerk ramp from where the arm stands, a pause, and the motion, all within the limits.
-
-    Raises AcquisitionError where the motion does not fit the arm or its limits, or the arm stands outside them.
-
-    `start`: (n,), where the arm stands [rad or m].
-    """
+    """A minimum-jerk ramp from `start`, (n,), a pause, the motion. Raises AcquisitionError where they do not fit."""
     _require_fitting(robot, trajectory, start, capabilities)
     rate_hz = choose_rate_hz(options, capabilities)
     if trajectory.duration_s * rate_hz > MOST_CYCLES:
@@ -121,7 +105,9 @@ def make_plan(
         robot, low, high, speed, following=options.following_error, temperature_c=options.temperature_c
     )
     _require_within(limits, robot, start, low, high, speed)
-    way = _ramp(robot, np.clip(start, limits.position_low, limits.position_high), trajectory, rate_hz)
+    begin = np.clip(start, limits.position_low, limits.position_high)
+    way = ramp(begin, trajectory.start, motion_limits(robot))
+    way = MoveSegment(way.start, way.end, float(np.ceil(way.duration_s * rate_hz)) / rate_hz)
     ramp_cycles = round(way.duration_s * rate_hz)
     moved = way.evaluate(np.arange(ramp_cycles) / rate_hz)
     pause = round(options.settle_s * rate_hz)
@@ -154,11 +140,6 @@ def _require_fitting(robot: Robot, trajectory: Trajectory, start: Array, capabil
     silent = [joint.name for joint, position in zip(robot.joints, start, strict=True) if not np.isfinite(position)]
     if silent:
         raise AcquisitionError(f"{silent[0]}: does not say where it stands; check its cable and its drive")
-
-
-def _ramp(robot: Robot, start: Array, trajectory: Trajectory, rate_hz: float) -> MoveSegment:
-    way = ramp(start, trajectory.start, motion_limits(robot))
-    return MoveSegment(way.start, way.end, float(np.ceil(way.duration_s * rate_hz)) / rate_hz)
 
 
 def _require_within(limits: GuardLimits, robot: Robot, start: Array, low: Array, high: Array, speed: Array) -> None:

@@ -321,7 +321,7 @@ def run_trajectory(
     prepare_folder(folder)
     record = new_record(robot.name, backend_name, options.mode.value)
     keep = partial(_keep_at_once, folder)
-    around = Surroundings(folder, stops or ManualStop(), keep, open_recorder, report or _nobody)
+    around = Surroundings(folder, stops or ManualStop(), keep, open_recorder, report or (lambda _event: None))
     run = Run(RunTask(robot, trajectory, options, connect), record, around)
     keep(record)
     return run.execute()
@@ -358,10 +358,6 @@ def _keep_at_once(folder: Path, record: RunRecord) -> None:
     except OSError as error:
         place = f"{folder}: the run's record cannot be written"
         raise AcquisitionError(f"{place} ({error.strerror or error})") from error
-
-
-def _nobody(event: Any) -> None:
-    del event
 
 
 SETTLED_S = 0.5  # time for which every joint has to stand still [s]

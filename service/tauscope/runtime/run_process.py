@@ -16,24 +16,9 @@ from typing import Any
 from tauscope.errors import AcquisitionError
 from tauscope.recording.journal_process import wait_for_writer
 from tauscope.robot import Robot
+from tauscope.runtime import record as records
 from tauscope.runtime.loop import Report
 from tauscope.runtime.options import RunOrder, write_order
-from tauscope.runtime.record import (
-    JOURNAL_FILE,
-    LOG_FILE,
-    RUN_FILE,
-    STOP_FILE,
-    ProcessName,
-    RunProblem,
-    RunRecord,
-    child_environment,
-    new_record,
-    read_process,
-    read_record,
-    wait_for_lock,
-    write_process,
-    write_record,
-)
 from tauscope.runtime.recorder import UNKNOWN_LOSS, save_recording
 from tauscope.runtime.run import prepare_folder
 from tauscope.runtime.states import RunState
@@ -49,35 +34,35 @@ _GONE = (
 )
 _NEVER_MOVED = (
     "the process that was to move the arm ended before the arm was under power: nothing has moved; "
-    f"{LOG_FILE} in the run's folder may say why"
+    f"{records.LOG_FILE} in the run's folder may say why"
 )
 _WITHOUT_POWER = (RunState.CREATED, RunState.CONNECTING)
 
 
-def recover_runs(folder: Path, *, patience_s: float = PATIENCE_S) -> tuple[RunRecord, ...]:
+def recover_runs(folder: Path, *, patience_s: float = PATIENCE_S) -> tuple[records.RunRecord, ...]:
     """Interrupt runs without owner, after `patience_s` [s]; nothing moves. Raises AcquisitionError."""
-    runs = sorted(path.parent for path in folder.glob(f"*/{RUN_FILE}"))
+    runs = sorted(path.parent for path in folder.glob(f"*/{records.RUN_FILE}"))
     recovered = (recover_run(run, patience_s=patience_s) for run in runs)
     return tuple(record for record in recovered if record is not None)
 
 
 def recover_run(
     folder: Path, *, is_own: bool = False, was_asked_to_stop: bool = False, patience_s: float = PATIENCE_S
-) -> RunRecord | None:
+) -> records.RunRecord | None:
     """The new record of a run without owner, None where it goes on or has ended. Raises AcquisitionError."""
-    record = read_record(folder)
+    record = records.read_record(folder)
     if record.state.is_end or (not is_own and record.owner is not None and record.owner.is_alive):
         return None
     # Also one that was frozen before it could hold the folder: it must not wake up to a run that is over.
-    for control in (record.control, read_process(folder)):
+    for control in (record.control, records.read_process(folder)):
         if control is not None:
             _see_to_its_end(control, patience_s)
-    lock = wait_for_lock(folder, patience_s)
+    lock = records.wait_for_lock(folder, patience_s)
     if lock is None:
         raise AcquisitionError(f"{folder}: its control process does not end; restart the machine and look at the arm")
     try:
         # It may have come to its end in the meantime.
-        record = read_record(folder)
+        record = records.read_record(folder)
         if record.state.is_end:
             return None
         if was_asked_to_stop and record.state is RunState.CREATED:
@@ -87,7 +72,7 @@ def recover_run(
         lock.release()
 
 
-def _see_to_its_end(control: ProcessName, patience_s: float) -> None:
+def _see_to_its_end(control: records.ProcessName, patience_s: float) -> None:
     """Wait for a control process that has no owner any more, and end it where it is itself frozen or stuck."""
     deadline = time.monotonic() + patience_s
     while control.is_alive:
@@ -97,20 +82,20 @@ def _see_to_its_end(control: ProcessName, patience_s: float) -> None:
         time.sleep(_POLL_S)
 
 
-def _interrupt(folder: Path, record: RunRecord) -> RunRecord:
+def _interrupt(folder: Path, record: records.RunRecord) -> records.RunRecord:
     recording = None
-    journal = folder / JOURNAL_FILE
+    journal = folder / records.JOURNAL_FILE
     if journal.exists():
         wait_for_writer(journal, _WRITER_S)
         recording = save_recording(folder, is_whole=False, lost_rows=UNKNOWN_LOSS)
     detail = _NEVER_MOVED if record.state in _WITHOUT_POWER and recording is None else _GONE
-    problem = record.problem or RunProblem(code=INTERRUPTED, detail=detail)
+    problem = record.problem or records.RunProblem(code=INTERRUPTED, detail=detail)
     return _write(folder, record.moved(RunState.INTERRUPTED, problem=problem, recording=recording))
 
 
-def _write(folder: Path, record: RunRecord) -> RunRecord:
+def _write(folder: Path, record: records.RunRecord) -> records.RunRecord:
     try:
-        write_record(folder, record)
+        records.write_record(folder, record)
     except OSError as error:
         raise AcquisitionError(f"{folder}: the run's record cannot be written ({error.strerror or error})") from error
     return record
@@ -141,32 +126,29 @@ class RunProcess:
         program = list(command or (sys.executable, "-m", "tauscope.runtime.control"))
         try:
             write_order(folder, order)
-            write_record(folder, new_record(robot.name, order.backend.name, order.options.mode.value))
-            with (folder / LOG_FILE).open("ab") as log:
+            records.write_record(folder, records.new_record(robot.name, order.backend.name, order.options.mode.value))
+            with (folder / records.LOG_FILE).open("ab") as log:
                 self._process = subprocess.Popen(  # noqa: S603 - our own program
                     [*program, str(folder)],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     stderr=log,
-                    env=child_environment(),
+                    env=records.child_environment(),
                     bufsize=0,
                 )
-            write_process(folder, self._process.pid)
+            self.pid = self._process.pid
+            records.write_process(folder, self.pid)
         except OSError as error:
             raise AcquisitionError(f"{folder}: the run cannot be started ({error.strerror or error})") from error
         assert self._process.stdin is not None  # noqa: S101 - asked for above
         assert self._process.stdout is not None  # noqa: S101
         self._commands, self._events = self._process.stdin, self._process.stdout
         os.set_blocking(self._commands.fileno(), False)
-        self._record: RunRecord | None = None
+        self._record: records.RunRecord | None = None
         self._problem: AcquisitionError | None = None
         self._has_ended, self._stop_asked = threading.Event(), threading.Event()
         self._watcher = threading.Thread(target=self._watch, name=f"run {folder.name}", daemon=True)
         self._watcher.start()
-
-    @property
-    def pid(self) -> int:
-        return self._process.pid
 
     @property
     def has_ended(self) -> bool:
@@ -185,7 +167,7 @@ class RunProcess:
         # Last and elsewhere: a disk that is stuck must not hold up the ways before, nor the caller.
         threading.Thread(target=self._put_stop_file, name="stop-file", daemon=True).start()
 
-    def wait(self, timeout_s: float | None = None) -> RunRecord:
+    def wait(self, timeout_s: float | None = None) -> records.RunRecord:
         """Wait for the end of the run [s]. Raises TimeoutError, or AcquisitionError where its record is lost."""
         if not self._has_ended.wait(timeout_s):
             raise TimeoutError(f"{self.folder}: the run has not ended within {timeout_s:g} s")
@@ -195,10 +177,8 @@ class RunProcess:
         return self._record
 
     def _put_stop_file(self) -> None:
-        try:
-            (self.folder / STOP_FILE).touch()
-        except OSError:
-            return
+        with suppress(OSError):
+            (self.folder / records.STOP_FILE).touch()
 
     def _send(self, byte: bytes) -> None:
         """Write to the control process; a full pipe means that it is stopped itself, and its device stops the arm."""
@@ -230,7 +210,7 @@ class RunProcess:
         try:
             was_asked_to_stop = self._stop_asked.is_set()
             ended = recover_run(self.folder, is_own=True, was_asked_to_stop=was_asked_to_stop)
-            self._record = ended or read_record(self.folder)
+            self._record = ended or records.read_record(self.folder)
         except AcquisitionError as error:
             self._problem = error
         self._has_ended.set()

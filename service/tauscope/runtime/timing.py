@@ -38,7 +38,10 @@ def real_time() -> Iterator[RealTime]:
     The other threads that there are become real-time too, below it: one that holds the interpreter's lock, and is kept
     from its processor by another program, would hold up the loop as well.
     """
-    locked = _lock_memory()
+    try:
+        locked = _library().mlockall(_LOCK_CURRENT_AND_FUTURE) == 0
+    except (OSError, AttributeError):
+        locked = False
     gc.collect()
     gc.freeze()
     gc.disable()
@@ -78,13 +81,6 @@ def _schedule(thread: int, policy: int, priority: int) -> None:
     """Schedule a thread, unless it has ended meanwhile."""
     with suppress(ProcessLookupError):
         os.sched_setscheduler(thread, policy, os.sched_param(priority))
-
-
-def _lock_memory() -> bool:
-    try:
-        return _library().mlockall(_LOCK_CURRENT_AND_FUTURE) == 0
-    except (OSError, AttributeError):
-        return False
 
 
 def _library() -> ctypes.CDLL:

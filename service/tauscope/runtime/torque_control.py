@@ -21,10 +21,7 @@ class TorqueControl:
     """
 
     def __init__(self, plan: Plan, inertia: Array, stride: int, bandwidth_rad_s: float) -> None:
-        """Set the gains.
-
-        `inertia`: (K, n, n), H at every `stride`-th cycle of the plan [kg m², kg m, kg]; `bandwidth_rad_s`: ω [rad/s].
-        """
+        """Set the gains. `inertia`: (K, n, n), H at every `stride`-th cycle [kg m², kg m, kg]; `bandwidth_rad_s`: ω."""
         largest = np.diagonal(inertia, axis1=1, axis2=2).max(axis=0)
         self._inertia, self._stride = inertia + _LEAST_INERTIA * np.diag(largest), stride
         self._proportional, self._derivative = bandwidth_rad_s**2, 2.0 * bandwidth_rad_s
@@ -57,12 +54,7 @@ class TorqueControl:
 
 
 def torque_control(robot: Robot, plan: Plan, bandwidth_rad_s: float) -> TorqueControl:
-    """The loop for an arm whose model is known.
-
-    Raises AcquisitionError where the robot file has no model to take the gains from, or the rate is too low.
-
-    `bandwidth_rad_s`: ω [rad/s].
-    """
+    """The loop for an arm of known model. Raises AcquisitionError: no model, or too slow. `bandwidth_rad_s`: ω."""
     found = compute_inertia(robot, plan.position)
     if found is None:
         raise AcquisitionError(

@@ -1,7 +1,4 @@
-"""One emulated CiA 402 drive: object dictionary, power state, cyclic modes, heartbeats and emergencies.
-
-Time is passed in, frames go in and come out; what moves is behind `AxisDemand` and `AxisMeasurement`.
-"""
+"""One emulated CiA 402 drive: objects, power state, modes, heartbeats. Time and frames go in, frames come out."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,11 +22,7 @@ class AxisMode(Enum):
 
 @dataclass(frozen=True)
 class AxisDemand:
-    """What a drive wants of its joint until the next demand.
-
-    `interpolation_s`: time in which it goes from one target to the next, where the mode is position; 0 where nobody
-        told it [s].
-    """
+    """What a drive wants of its joint. `interpolation_s`: from one target to the next, where it is told; else 0 [s]."""
 
     mode: AxisMode
     position: float = 0.0  # target where the mode is position [rad or m]
@@ -198,10 +191,7 @@ class EmulatedDrive:
         return (word >> 16 & 0x7F) if word & 0xFFFF and word >> 16 & 0x7F else -1
 
     def _watch_master(self, now_s: float) -> None:
-        """React to a master that stays away.
-
-        A heartbeat is missed also where none was ever heard since the watch began; guarding begins with a remote frame.
-        """
+        """React to a master that stays away, also one never heard; guarding begins with a remote frame."""
         heartbeat_s = (self.dictionary.get(0x1016, 1) & 0xFFFF) / 1e3 if self._watched_node >= 0 else 0.0
         life_s = self.dictionary.get(0x100C) * self.dictionary.get(0x100D) / 1e3
         if not heartbeat_s:

@@ -39,11 +39,7 @@ class DrivenArm:
         period_s: float,
         torque_noise: float = 0.0,
     ) -> None:
-        """Everything at rest.
-
-        `position`: (n,), where it stands [rad or m]; `period_s`: of the drives' loops [s]; `torque_noise`: standard
-        deviation of what they measure of the torque [Nm or N].
-        """
+        """Everything at rest at `position` (n,) [rad or m]. `torque_noise`: standard deviation measured [Nm or N]."""
         count = robot.joint_count
         self.torque = np.zeros(count)
         self.stands_on_stand = True

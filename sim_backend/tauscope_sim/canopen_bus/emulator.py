@@ -14,7 +14,6 @@ from tauscope_sim.canopen_bus.lines import CanSocket, SerialLine, SocketLine, Wi
 from tauscope_sim.canopen_bus.power_state import PowerState
 from tauscope_sim.emulation.emulator import STEP_S, Emulator, EmulatorOrder, Port
 from tauscope_sim.emulation.fault_kit import AnswerFaults, FaultKind, InjectedFault
-from tauscope_sim.scenario import Scenario
 from tauscope_sim.scenario_file import read_scenario
 
 _TICKS_PER_MEASUREMENT = 10  # while nobody asks: a drive that has stopped has to see that it stands
@@ -178,20 +177,14 @@ class CanEmulator(Emulator):
 _SOCKET = "socketcan:"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CanOrder(EmulatorOrder):
     """What to emulate."""
 
     robot: str
-    start: tuple[float, ...]  # where the joints stand [rad or m]
-    port: str
-    control: str
     rated_torque_mnm: tuple[int, ...]  # object 0x6076 of each drive, at the motor shaft [mNm]
-    scenario: str | None = None
     torque_noise: float = 0.0  # standard deviation of what the drives measure of the torque [Nm or N]
     bit_rate: int = 1_000_000  # of the bus [bit/s]
-    stepped: bool = False
-    trace: str | None = None
 
     def open_port(self) -> Port:
         """A serial adapter on a pseudo terminal, or the kernel's CAN bus."""
@@ -200,7 +193,7 @@ class CanOrder(EmulatorOrder):
     def build(self, now_s: float) -> CanEmulator:
         """The emulator."""
         robot = read_robot(Path(self.robot))
-        scenario = Scenario() if self.scenario is None else read_scenario(Path(self.scenario), robot)
+        scenario = read_scenario(self.scenario, robot)
         drives = []
         for joint, rated in zip(robot.joints, self.rated_torque_mnm, strict=True):
             block, ratio = joint.drive or {}, joint.gear_ratio or 1.0

@@ -26,10 +26,7 @@ class SerialLine:
         self._pending = b""
 
     def take(self, data: bytes) -> tuple[list[Frame], bytes]:
-        """Frames for the bus, and what the adapter answers.
-
-        Extended frames are acknowledged and go nowhere: no drive listens to them.
-        """
+        """Frames for the bus, and the adapter's answers. Extended frames are acknowledged and go nowhere."""
         *lines, self._pending = (self._pending + data).split(_END)
         if len(self._pending) > _LONGEST_LINE:
             self._pending = b""

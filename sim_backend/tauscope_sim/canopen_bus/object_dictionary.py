@@ -80,19 +80,12 @@ class ObjectDictionary:
         entry.value = min(max(value, low), high)
 
     def encode(self, index: int, subindex: int, *, by_master: bool = False) -> bytes:
-        """Value of an entry, little end first, as the drive itself sends it, or as a master gets it.
-
-        Raises AbortError where there is no such entry.
-        """
+        """Value of an entry, little end first, as the drive or a master has it. Raises AbortError without an entry."""
         entry = self._find(index, subindex, by_master=by_master)
         return entry.value.to_bytes(entry.bytes, "little", signed=entry.signed)
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
-        """A master's write.
-
-        Raises AbortError where there is no such entry, it is not writable, the length is wrong, or the drive refuses
-        the value.
-        """
+        """A master's write. Raises AbortError: no such entry, not writable, a wrong length, or refused."""
         entry = self._find(index, subindex, by_master=True)
         if not entry.writable:
             raise AbortError(Abort.READ_ONLY)

@@ -15,7 +15,6 @@ from tauscope.robot import Robot, read_robot, robot_from_dict
 from tauscope_sim.device.device import SimulatedDevice
 from tauscope_sim.device.server import DeviceServer, TraceWriter
 from tauscope_sim.own_process import take_precedence
-from tauscope_sim.scenario import Scenario
 from tauscope_sim.scenario_file import read_scenario
 
 READY = "ready"  # line on standard output once hosts can connect
@@ -26,7 +25,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         robot = _robot(options.robot)
-        scenario = Scenario() if options.scenario is None else read_scenario(options.scenario, robot)
+        scenario = read_scenario(options.scenario, robot)
         start = None if options.start_position is None else _numbers(options.start_position, robot.joint_count)
         device = SimulatedDevice(robot, scenario, start_position=start, start_ns=time.monotonic_ns())
         trace = TraceWriter(options.trace, device)

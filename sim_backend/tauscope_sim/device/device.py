@@ -2,7 +2,7 @@
 
 import copy
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,10 +25,10 @@ _TICK_S = TICK_NS * 1e-9
 _TICKS_PER_TEMPERATURE = 64
 
 
-@dataclass(frozen=True)
-class _Enabling:
-    stop_policy: StopPolicy
-    watchdog_ns: int
+def list_capabilities(joint_count: int, largest_rate_hz: float) -> Capabilities:
+    """What simulated drives can do, at a rate that a connection to them carries [Hz]."""
+    modes, policies = frozenset(ControlMode), frozenset(StopPolicy)
+    return Capabilities(joint_count, modes, policies, largest_rate_hz, WATCHDOG_RANGE_S, takes_feed_forward=True)
 
 
 class SimulatedDevice:
@@ -61,28 +61,11 @@ class SimulatedDevice:
         self._latency_ticks = scenario.command_latency_s / _TICK_S
         self._pending: deque[tuple[float, Setpoint]] = deque()
         self._latch = FaultLatch()
-        self._activity = Activity.BRAKED
-        self._enabling: _Enabling | None = None
+        self.activity = Activity.BRAKED
+        self._enabling: tuple[StopPolicy, int] | None = None  # how it is stopped, and after which silence [ns]
         self._start_ns, self._tick = start_ns, 0
-        self._sample_ns = self._fed_ns = start_ns
-        self.capabilities = Capabilities(
-            joint_count=count,
-            modes=frozenset(ControlMode),
-            stop_policies=frozenset(StopPolicy),
-            largest_rate_hz=1.0 / _TICK_S,
-            watchdog_range_s=WATCHDOG_RANGE_S,
-            takes_feed_forward=True,
-        )
-
-    @property
-    def time_ns(self) -> int:
-        """Device time of the last tick [ns]."""
-        return self._sample_ns
-
-    @property
-    def activity(self) -> Activity:
-        """What the drives are doing."""
-        return self._activity
+        self.time_ns = self._fed_ns = start_ns
+        self.capabilities = list_capabilities(count, 1.0 / _TICK_S)
 
     @property
     def fault_codes(self) -> tuple[str, ...]:
@@ -98,7 +81,7 @@ class SimulatedDevice:
         """Carry out every tick up to and at an instant; one that has passed changes nothing."""
         last = (time_ns - self._start_ns) // TICK_NS
         while self._tick <= last:
-            if self._activity is Activity.BRAKED and not self._disturbances.waiting:
+            if self.activity is Activity.BRAKED and not self._disturbances.waiting:
                 self._tick = last
             self._carry_out_tick()
             self._tick += 1
@@ -114,16 +97,12 @@ class SimulatedDevice:
             position, velocity, effort, temperature = (
                 np.where(lost, np.nan, values) for values in (position, velocity, effort, temperature)
             )
-        enabled = np.full(len(position), self._activity in POWERED)
-        return ArmState(self._sample_ns, position, velocity, effort, temperature, enabled, self._latch.faults)
+        enabled = np.full(len(position), self.activity in POWERED)
+        return ArmState(self.time_ns, position, velocity, effort, temperature, enabled, self._latch.faults)
 
     def enable(self, mode: ControlMode, limits: DriveLimits, stop_policy: StopPolicy, watchdog_s: float) -> None:
-        """Take the arm under power where it stands.
-
-        Raises DriverError: ``refused`` or ``fault``.
-        `watchdog_s`: time without setpoints after which it does [s].
-        """
-        if self._activity in COMMANDED:
+        """Take the arm under power where it stands, for `watchdog_s` [s]. Raises DriverError ``refused``, ``fault``."""
+        if self.activity in COMMANDED:
             raise DriverError.refusal("the arm is enabled already; stop it before enabling it again")
         self._refuse_faults()
         shortest, longest = WATCHDOG_RANGE_S
@@ -133,38 +112,34 @@ class SimulatedDevice:
             )
         motion = self._motion()
         require_sensible(limits, motion.position, [f"joint {number + 1}" for number in range(len(motion.position))])
-        self._drives.enable(self._activity, motion, copy.deepcopy(limits))
-        self._enabling = _Enabling(stop_policy, round(watchdog_s * 1e9))
-        self._activity = commanded_by(mode)
-        self._fed_ns = self._sample_ns
+        self._drives.enable(self.activity, motion, copy.deepcopy(limits))
+        self._enabling = stop_policy, round(watchdog_s * 1e9)
+        self.activity = commanded_by(mode)
+        self._fed_ns = self.time_ns
 
     def command(self, setpoint: Setpoint, sent_ns: int | None = None) -> None:
-        """Take the host's setpoint, and feed the watchdog; drives that stopped by a fault do not follow it.
-
-        Raises DriverError: ``not-enabled`` or ``refused``.
-        `sent_ns`: when it was sent, by the device's clock; None for now [ns].
-        """
+        """Take a setpoint, feed the watchdog. Raises DriverError ``not-enabled``, ``refused``. `sent_ns`: None: now."""
         if self._enabling is None:
             raise DriverError(DriverErrorKind.NOT_ENABLED, "the arm is not enabled; enable it before sending setpoints")
         require_finite(setpoint, self.capabilities.joint_count)
         kept = copy.deepcopy(setpoint)
-        if self._activity in COMMANDED:
-            sent_ns = self._sample_ns if sent_ns is None else sent_ns
+        if self.activity in COMMANDED:
+            sent_ns = self.time_ns if sent_ns is None else sent_ns
             # a device that makes up for lost time has not come as far as the host yet
-            self._fed_ns = max(self._sample_ns, sent_ns)
+            self._fed_ns = max(self.time_ns, sent_ns)
             self._pending.append(((sent_ns - self._start_ns) / TICK_NS + self._latency_ticks, kept))
 
     def stop(self, policy: StopPolicy | None = None) -> None:
         """Stop the arm; legal at any time. Setpoints that are still on their way are forgotten."""
-        if policy is None and self._enabling is not None and self._activity in COMMANDED:
-            policy = self._enabling.stop_policy
+        if policy is None and self._enabling is not None and self.activity in COMMANDED:
+            policy = self._enabling[0]
         self._enabling = None
         if policy is not None:
             self._stop(policy)
 
     def lose_host(self, detail: str) -> None:
         """The host is gone: what the watchdog would find out in its time."""
-        if self._activity in COMMANDED:
+        if self.activity in COMMANDED:
             self._trip(FaultCode.WATCHDOG, None, detail)
         self._enabling = None
 
@@ -175,14 +150,11 @@ class SimulatedDevice:
         self._refuse_faults()
 
     def put_back(self) -> None:
-        """Carry the arm back to where it began and set its brakes: nobody's order to the drives, but a hand's work.
-
-        Faults and disturbances are gone afterwards. Raises DriverError: ``refused`` while the arm is enabled.
-        """
-        if self._activity in COMMANDED:
+        """Carry the arm back to where it began, without faults. Raises DriverError ``refused`` while it is enabled."""
+        if self.activity in COMMANDED:
             raise DriverError.refusal("the arm is enabled; stop it before carrying it back")
         self._enabling = None
-        self._activity = Activity.BRAKED
+        self.activity = Activity.BRAKED
         self._latch.clear()
         self._disturbances = Disturbances(self.capabilities.joint_count)
         self._mechanism.put_back(self._tick)
@@ -193,36 +165,36 @@ class SimulatedDevice:
             raise DriverError.refusal(
                 f"joint {injection.joint}: the arm has {self.capabilities.joint_count} joints; name one of them"
             )
-        begins = max(injection.start_ns, self._sample_ns + TICK_NS)
+        begins = max(injection.start_ns, self.time_ns + TICK_NS)
         self._disturbances.add(replace(injection, start_ns=begins))
 
     def _carry_out_tick(self) -> None:
-        self._sample_ns = self._start_ns + self._tick * TICK_NS
+        self.time_ns = self._start_ns + self._tick * TICK_NS
         if self._disturbances.waiting or self._tick % _TICKS_PER_TEMPERATURE == 0:
-            self._disturbances.update(self._sample_ns)
+            self._disturbances.update(self.time_ns)
             self._look_for_faults()
-        if self._activity is Activity.BRAKED:
+        if self.activity is Activity.BRAKED:
             self._mechanism.rest(self._tick)
             return
         motion = self._motion()
-        if self._enabling is not None and self._activity in COMMANDED:
-            self._serve_host(self._enabling, motion)
+        if self._enabling is not None and self.activity in COMMANDED:
+            self._serve_host(self._enabling[1], motion)
         try:
-            self._mechanism.move(self._drives.torque(self._activity, motion, self._tick), self._tick)
+            self._mechanism.move(self._drives.torque(self.activity, motion, self._tick), self._tick)
         except ScenarioError as error:
             # no arm moves like this: it is put to rest where it was, as if it had never been under power
-            self._activity = Activity.BRAKED
+            self.activity = Activity.BRAKED
             self._latch.latch(device_fault(FaultCode.UNSTABLE, None, str(error)))
 
-    def _serve_host(self, enabling: _Enabling, motion: Motion) -> None:
+    def _serve_host(self, watchdog_ns: int, motion: Motion) -> None:
         """Take the setpoints that are due; stop where none has come for too long, or where one leads too far."""
         while self._pending and self._pending[0][0] <= self._tick:
             arrival, setpoint = self._pending.popleft()
-            self._drives.command(self._activity, setpoint, arrival)
-        silence_ns = self._sample_ns - self._fed_ns
-        if silence_ns >= enabling.watchdog_ns:
+            self._drives.command(self.activity, setpoint, arrival)
+        silence_ns = self.time_ns - self._fed_ns
+        if silence_ns >= watchdog_ns:
             self._trip(FaultCode.WATCHDOG, None, f"no setpoint for {silence_ns * 1e-6:.1f} ms")
-        elif self._activity is Activity.TORQUE and (overrun := self._drives.overrun(motion)) is not None:
+        elif self.activity is Activity.TORQUE and (overrun := self._drives.overrun(motion)) is not None:
             self._trip(*overrun)
 
     def _motion(self) -> Motion:
@@ -231,16 +203,16 @@ class SimulatedDevice:
         return Motion(position, true.motor_velocity)
 
     def _stop(self, policy: StopPolicy) -> None:
-        before, self._activity = self._activity, stopped_by(self._activity, policy)
+        before, self.activity = self.activity, stopped_by(self.activity, policy)
         self._pending.clear()
-        if self._activity is Activity.HOLDING and before is not Activity.HOLDING:
+        if self.activity is Activity.HOLDING and before is not Activity.HOLDING:
             self._drives.hold(before, self._motion())
 
     def _trip(self, code: FaultCode, joint: int | None, detail: str) -> None:
         """Latch a fault; where the host has the arm, stop by the policy that it left."""
         self._latch.latch(device_fault(code, joint, detail))
-        if self._enabling is not None and self._activity in COMMANDED:
-            self._stop(self._enabling.stop_policy)
+        if self._enabling is not None and self.activity in COMMANDED:
+            self._stop(self._enabling[0])
 
     def _look_for_faults(self) -> None:
         temperature = self._mechanism.true.temperature + self._disturbances.heat

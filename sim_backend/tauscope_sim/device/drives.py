@@ -99,7 +99,7 @@ class Drives:
 
     def hold(self, before: Activity, motion: Motion) -> None:
         """Bring the joints to rest and hold them."""
-        if before is Activity.TRACKING or self._waits_for_torque(before):
+        if before is Activity.TRACKING or (before is Activity.TORQUE and self._commanded_torque is None):
             self._servo.absorb(self._target.feed_forward)
             self._target.brake()
             return
@@ -123,13 +123,7 @@ class Drives:
         return self._servo.track(error, error_rate, forward, motion.position)
 
     def overrun(self, motion: Motion) -> tuple[FaultCode, int, str] | None:
-        """What takes the arm beyond its limits in torque control, where no target keeps it within them.
-
-        A joint that could not be stopped any more within its range counts as outside already.
-
-        Returns tuple of FaultCode, int and str, or None: the fault, the joint's number counted from 1, and what
-        happened.
-        """
+        """What takes the arm beyond its limits in torque control; who cannot be stopped in time counts, too."""
         speed = np.abs(motion.velocity)
         if (speed > self._fastest).any():
             column = int(np.argmax(speed - self._fastest))
@@ -148,6 +142,3 @@ class Drives:
 
     def _target_at(self, motion: Motion) -> Target:
         return Target(motion.position, motion.velocity, self._acceleration, self._tick_s)
-
-    def _waits_for_torque(self, activity: Activity) -> bool:
-        return activity is Activity.TORQUE and self._commanded_torque is None

@@ -1,5 +1,6 @@
 """Faults of the simulated drives: their words, and those that a test makes happen."""
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -52,16 +53,14 @@ class Injection:
     duration_ns: int | None = None  # how long it lasts; None for ever [ns]
     size: float = 0.0  # rise of the temperature or slip of the encoder [K; rad or m]
 
-    def active_at(self, time_ns: int) -> bool:
-        """Whether it acts at an instant."""
-        return self.start_ns <= time_ns and (self.duration_ns is None or time_ns < self.start_ns + self.duration_ns)
+    @property
+    def end_ns(self) -> float:
+        """Device time at which it ends; infinite where it never does [ns]."""
+        return math.inf if self.duration_ns is None else self.start_ns + self.duration_ns
 
 
 def device_fault(code: FaultCode, joint: int | None, detail: str) -> Fault:
-    """The fault as the protocol of `drivers` states it.
-
-    `joint`: joint number, counted from 1; None for the whole arm.
-    """
+    """The fault as the protocol of `drivers` states it. `joint`: counted from 1; None for the whole arm."""
     return Fault(code.value, joint, detail, REMEDIES[code])
 
 
@@ -111,7 +110,7 @@ class Disturbances:
             return
         for values in (self.heat, self.lost, self.overloaded):
             values[:] = 0
-        for injection in [one for one in self._injections if one.active_at(time_ns)]:
+        for injection in [one for one in self._injections if one.start_ns <= time_ns < one.end_ns]:
             joint = injection.joint - 1
             if injection.kind is Disturbance.ENCODER_JUMP:
                 self.slip[joint] += injection.size
@@ -122,8 +121,4 @@ class Disturbances:
                 self.lost[joint] = True
             else:
                 self.overloaded[joint] = True
-        self._injections = [one for one in self._injections if not _is_over(one, time_ns)]
-
-
-def _is_over(injection: Injection, time_ns: int) -> bool:
-    return injection.duration_ns is not None and time_ns >= injection.start_ns + injection.duration_ns
+        self._injections = [one for one in self._injections if time_ns < one.end_ns]

@@ -1,6 +1,6 @@
 """The arm behind the drives, moved tick by tick, and the state at each tick that readings are taken from."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,10 +18,7 @@ REACH = 1.0  # postures are looked for within so much of zero [rad or m]
 
 
 def resting_posture(robot: Robot) -> Array:
-    """Zero, or the end of each joint's range nearest to it; elsewhere where a joint has next to no inertia there.
-
-    Returns (n,), position [rad or m].
-    """
+    """Zero, or the end of each range nearest to it, (n,) [rad or m]; elsewhere where a joint has next to no inertia."""
     ranges = np.array([joint.limits.position or (-np.inf, np.inf) for joint in robot.joints])
     nearest = np.clip(0.0, ranges[:, 0], ranges[:, 1])
     # the same arm stands at the same place every time
@@ -42,60 +39,32 @@ def _inertia(bodies: RigidBodies, posture: Array) -> Array:
 VELOCITY_BANDWIDTH = 2.0 * np.pi * 20.0
 
 
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """The true state that one reading is taken from."""
+class Sample(NamedTuple):
+    """The true state of the motors, in joint units, that one reading is taken from; (n,) each."""
 
-    time_s: float  # by the plant's clock [s]
-    position: Array  # (n,), of the motors, in joint units [rad or m]
-    velocity: Array  # (n,), likewise [rad/s or m/s]
-    torque: Array  # (n,), of the motors on the joint's side [Nm or N]
-
-
-class Readings:
-    """Readings of one arm; an instant has one reading, however often it is asked for.
-
-    Position and torque are what `Scenario.sensors` makes of them. Velocity is the drive's estimate: exact where the
-    encoder is, else with white noise as large as the encoder's error times `VELOCITY_BANDWIDTH`.
-
-    Raises ScenarioError where a sensor's effect contradicts the robot.
-    """
-
-    def __init__(self, scenario: Scenario, robot: Robot) -> None:
-        self._sensors = scenario.sensors(robot)
-        encoder_error = np.sqrt(np.square(scenario.position_noise_std) + np.square(scenario.encoder_step) / 12.0)
-        self._velocity_std = VELOCITY_BANDWIDTH * np.broadcast_to(encoder_error, (robot.joint_count,))
-        self._noisy = bool(self._velocity_std.any())
-        self._rng = np.random.default_rng([scenario.seed, 1])
-        self._sample: Sample | None = None
-        self._reading: tuple[Array, Array, Array] | None = None
-
-    def of(self, sample: Sample) -> tuple[Array, Array, Array]:
-        """Position, velocity and torque as the drives report them, each (n,)."""
-        if self._reading is None or sample is not self._sample:
-            position, torque = self._sensors.measure(sample.time_s, sample.position, sample.torque)
-            velocity = sample.velocity
-            if self._noisy:
-                velocity = velocity + self._velocity_std * self._rng.standard_normal(len(velocity))
-            self._sample, self._reading = sample, (position, velocity, torque)
-        return self._reading
+    time_s: float
+    position: Array
+    velocity: Array
+    torque: Array
 
 
 class Mechanism:
-    """Plant and sensors.
+    """Plant and sensors; an instant has one reading, however often it is asked for.
 
-    `start_position`: (n,), where the arm stands; None is `resting_posture` [rad or m].
-    `tick_s`: time between two ticks [s].
-
-    Raises RobotFileError where the robot file lacks what a simulation needs.
-    Raises ScenarioError where the scenario does not fit the arm.
+    Position and torque are what `Scenario.sensors` makes of them; the encoder's error gives velocity noise, by
+    `VELOCITY_BANDWIDTH`. `start_position`: (n,), None: `resting_posture` [rad or m]; `tick_s`: between ticks [s].
+    Raises RobotFileError, ScenarioError: no simulation of this arm.
     """
 
     def __init__(self, robot: Robot, scenario: Scenario, start_position: ArrayLike | None, tick_s: float) -> None:
         self._plant = scenario.plant(robot)
         self._start = resting_posture(robot) if start_position is None else np.array(start_position, dtype=np.float64)
         self._plant.place(self._start)
-        self._readings = Readings(scenario, robot)
+        self._sensors = scenario.sensors(robot)
+        encoder_error = np.sqrt(np.square(scenario.position_noise_std) + np.square(scenario.encoder_step) / 12.0)
+        self._velocity_std = VELOCITY_BANDWIDTH * np.broadcast_to(encoder_error, (robot.joint_count,))
+        self._rng = np.random.default_rng([scenario.seed, 1])
+        self._reading: tuple[Array, Array, Array] | None = None
         self._tick_s = tick_s
         self._zero = np.zeros(robot.joint_count)
         self._torque = self._zero
@@ -104,15 +73,19 @@ class Mechanism:
 
     def reading(self) -> tuple[Array, Array, Array]:
         """Position, velocity and torque at the last tick as the drives report them, each (n,)."""
-        return self._readings.of(self._sample)
+        if self._reading is None:
+            time_s, position, velocity, torque = self._sample
+            position, torque = self._sensors.measure(time_s, position, torque)
+            if self._velocity_std.any():
+                velocity = velocity + self._velocity_std * self._rng.standard_normal(len(velocity))
+            self._reading = position, velocity, torque
+        return self._reading
 
     def move(self, torque: Array, tick: int) -> None:
-        """Take the reading of a tick, then let the arm move until the next.
+        """Take the reading of a tick, its torque the mean of before and after it, then let the arm move until the next.
 
-        The torque of a reading is the mean of those before and after the tick, which belongs to the tick's own instant.
-        Raises ScenarioError where the motion grows beyond all bounds; the arm is at rest then.
-
-        `torque`: (n,), of the drives from this tick on [Nm or N].
+        Raises ScenarioError beyond all bounds; the arm is at rest then. `torque`: (n,), of the drives from now on [Nm
+        or N].
         """
         self._take(0.5 * (self._torque + torque), tick)
         self._torque = torque
@@ -137,3 +110,4 @@ class Mechanism:
 
     def _take(self, torque: Array, tick: int) -> None:
         self._sample = Sample(tick * self._tick_s, self.true.motor_position, self.true.motor_velocity, torque)
+        self._reading = None

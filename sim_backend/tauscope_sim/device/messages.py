@@ -64,10 +64,7 @@ class FrameBuffer:
         self._bytes = bytearray()
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Take what arrived and return the frames that are complete.
-
-        Raises BrokenFrameError where the kind is unknown or the body longer than `LARGEST_BODY`.
-        """
+        """Take what arrived; the frames that are complete. Raises BrokenFrameError: unknown kind, or too long."""
         self._bytes += data
         frames: list[Frame] = []
         while len(self._bytes) >= _HEADER.size:
@@ -127,18 +124,12 @@ def decode_document(kind: type[_Document], body: bytes) -> _Document:
 
 
 def encode_setpoint(sent_ns: int, setpoint: Setpoint) -> bytes:
-    """Instant, then position and torque, 2 n numbers.
-
-    `sent_ns`: present instant of the machine's monotonic clock [ns].
-    """
+    """Instant, then position and torque, 2 n numbers. `sent_ns`: now, by the machine's monotonic clock [ns]."""
     return _INSTANT.pack(sent_ns) + np.concatenate([setpoint.position, setpoint.torque]).astype("<f8").tobytes()
 
 
 def decode_setpoint(body: bytes, joint_count: int) -> tuple[int, Setpoint]:
-    """Instant and setpoint of an exchange; whether its numbers are finite is the device's matter.
-
-    Raises BadMessageError where it holds another number of values.
-    """
+    """Instant and setpoint of an exchange, finite or not. Raises BadMessageError for another number of values."""
     if len(body) != _INSTANT.size + 16 * joint_count:
         raise BadMessageError(f"a setpoint of {len(body)} bytes for {joint_count} joints")
     numbers = np.frombuffer(body, dtype="<f8", offset=_INSTANT.size).astype(np.float64)

@@ -5,7 +5,6 @@ import select
 import socket
 import struct
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 from tauscope_drivers import DriverError, StopPolicy
@@ -20,10 +19,7 @@ FIXED_COLUMNS = ("time_ns", "activity", "faults")
 
 
 class TraceWriter:
-    """Appends lines to a CSV file: time, activity, faults, true position and velocity of each joint.
-
-    Each line is written at once and by itself, so that the file is complete up to the last line when the process dies.
-    """
+    """A CSV file of time, activity, faults, true position and velocity, whole up to the last line however it ends."""
 
     def __init__(self, path: Path, device: SimulatedDevice) -> None:
         self._device = device
@@ -63,14 +59,6 @@ OLDEST_NS = 100_000_000  # a setpoint that claims to have been sent longer ago c
 _PEER = struct.Struct("3i")
 
 
-@dataclass
-class Punctuality:
-    """How well the device kept to the machine's clock."""
-
-    overruns: int = 0
-    largest_lag_ns: int = 0  # the latest of them [ns]
-
-
 class _Host:
     def __init__(self, connection: socket.socket) -> None:
         connection.setblocking(False)
@@ -104,7 +92,7 @@ class DeviceServer:
         self._host: _Host | None = None
         self._alone_since_ns = time.monotonic_ns()
         self._finished = False
-        self.punctuality = Punctuality()
+        self._overruns = self._largest_lag_ns = 0
 
     def finish(self) -> None:
         """End after the present pass; may be called from a signal handler."""
@@ -130,8 +118,8 @@ class DeviceServer:
     def _pass(self, now_ns: int) -> None:
         lag_ns = now_ns - self._device.time_ns
         if self._device.activity is not Activity.BRAKED and lag_ns > LATE_NS:
-            self.punctuality.overruns += 1
-            self.punctuality.largest_lag_ns = max(self.punctuality.largest_lag_ns, lag_ns)
+            self._overruns += 1
+            self._largest_lag_ns = max(self._largest_lag_ns, lag_ns)
             self._serve()
         while (behind_ns := now_ns - self._device.time_ns) > LATE_NS and not self._finished:
             self._device.advance_to(now_ns - behind_ns + PASS_NS)
@@ -211,7 +199,9 @@ class DeviceServer:
             case messages.FrameKind.HELLO:
                 return messages.FrameKind.WELCOME, self._welcome(body)
             case messages.FrameKind.STATUS:
-                return messages.FrameKind.REPORT, self._report()
+                report = {"activity": device.activity.value, "time_ns": device.time_ns, "overruns": self._overruns}
+                report["largest_lag_ns"] = self._largest_lag_ns
+                return messages.FrameKind.REPORT, messages.encode_document(report)
             case messages.FrameKind.EXCHANGE:
                 sent_ns, setpoint = messages.decode_setpoint(body, device.capabilities.joint_count)
                 now_ns = time.monotonic_ns()
@@ -240,13 +230,3 @@ class DeviceServer:
                 f"the device speaks version {messages.PROTOCOL}, not {asked!r}; use one Tauscope for both"
             )
         return messages.encode_document({"joint_count": self._device.capabilities.joint_count, "process": os.getpid()})
-
-    def _report(self) -> bytes:
-        return messages.encode_document(
-            {
-                "activity": self._device.activity.value,
-                "time_ns": self._device.time_ns,
-                "overruns": self.punctuality.overruns,
-                "largest_lag_ns": self.punctuality.largest_lag_ns,
-            }
-        )

@@ -75,12 +75,7 @@ _TICKS_PER_STIFFNESS = 16
 
 
 class Servo:
-    """Torque of the drives, with the integral's memory.
-
-    The integral is slower where the transmission is compliant: there it works against the damping of the link.
-
-    `tick_s`: time between two ticks [s].
-    """
+    """Torque of the drives, with an integral, slower where transmissions are compliant. `tick_s`: [s]."""
 
     def __init__(self, robot: Robot, inertia: InertiaSchedule, tick_s: float) -> None:
         self._inertia = inertia
@@ -109,20 +104,11 @@ class Servo:
         self._age = _TICKS_PER_STIFFNESS
 
     def absorb(self, feed_forward: Array) -> None:
-        """Keep a feed-forward torque that is about to end, so that nothing jerks.
-
-        `feed_forward`: (n,), torque of the host [Nm or N].
-        """
+        """Keep a feed-forward torque that is about to end, so that nothing jerks. `feed_forward`: (n,) [Nm or N]."""
         self._integral = self.capped(self._integral + feed_forward)
 
     def track(self, error: Array, error_rate: Array, feed_forward: Array | None, position: Array) -> Array:
-        """Torque of the position loop, (n,) [Nm or N].
-
-        `error`: (n,), target less position [rad or m].
-        `error_rate`: (n,), target velocity less velocity [rad/s or m/s].
-        `feed_forward`: (n,), torque of the host; None for none [Nm or N].
-        `position`: (n,), q, for H(q) [rad or m].
-        """
+        """Torque of the position loop, (n,). `error`, `error_rate`: target less arm; `feed_forward`; `position`: q."""
         damping, stiffness, load = self._renew(position)
         proportional = stiffness.dot(_PROPORTIONAL * error) + self._stiffness * error
         integral = self._integral + self._integral_step * proportional
@@ -138,10 +124,7 @@ class Servo:
         return torque
 
     def damp(self, position: Array, velocity: Array) -> Array:
-        """Torque against motion, (n,) [Nm or N].
-
-        `position`: (n,), q, for H(q) [rad or m]; `velocity`: (n,), q̇ [rad/s or m/s].
-        """
+        """Torque against motion, (n,) [Nm or N]. `position`: q, for H(q) [rad or m]; `velocity`: q̇ [rad/s or m/s]."""
         damping, _, _ = self._renew(position)
         return self.capped(-DAMPING * damping.dot(velocity))
 

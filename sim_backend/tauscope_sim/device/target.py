@@ -66,24 +66,15 @@ class SetpointSpline:
         self._points[3] = position
 
     def is_starved(self, time: float) -> bool:
-        """Whether setpoints have failed to come for so long that the target should come to rest.
-
-        `time`: instant [ticks].
-        """
+        """Whether setpoints have failed to come for so long that the target should come to rest. `time`: [ticks]."""
         return time - self._grid > _LATEST_PHASE * self._period
 
     def restart(self, position: Array) -> None:
-        """Continue with setpoints from another place; the pace of the host is not forgotten.
-
-        `position`: (n,), where the target stands [rad or m].
-        """
+        """Go on with setpoints from `position`, (n,) [rad or m]; the pace of the host is not forgotten."""
         self._points[:] = position
 
     def at(self, time: float) -> tuple[Array, Array]:
-        """Target [rad or m] and its rate [per tick] at an instant, each (n,).
-
-        `time`: not long before the last setpoint [ticks].
-        """
+        """Target [rad or m] and its rate [per tick] at an instant [ticks] not long before the last setpoint, (n,)."""
         overdue = (time - self._grid) / self._period
         rate = 1.0 / self._period
         x = min(max(overdue, -1.0), 1.0)
@@ -180,17 +171,11 @@ def catching_up_acceleration(robot: Robot) -> Array:
 
 
 class Target:
-    """Position, velocity and feed-forward torque of the target.
+    """Position, velocity and feed-forward torque of the target, which stays within range and speed limit.
 
-    It stays within the range and below the speed limit, whatever the host asks.
-
-    Setpoints that move within the limits are followed exactly. One that leaps is approached with bounded acceleration.
-
-    `position`: (n,), where it begins [rad or m].
-    `velocity`: (n,), how it moves there; zero for an arm at rest [rad/s or m/s].
-    `acceleration`: (n,), with which it catches up with setpoints that leapt [rad/s² or m/s²].
-    `tick_s`: time between two ticks [s].
-    `period`: time between setpoints, where the host has told it [ticks].
+    Setpoints within the limits are followed exactly; one that leaps is approached with `acceleration` [rad/s² or m/s²].
+    `position`, `velocity`: (n,), where it begins and how [rad or m, and per s]; `tick_s`: of a tick [s]; `period`: of
+    setpoints, where it is told [ticks].
     """
 
     def __init__(
@@ -216,10 +201,7 @@ class Target:
         self._behind = False
 
     def limit(self, low: Array, high: Array, fastest: Array) -> None:
-        """Keep the target within limits from now on; a target that is outside the range may stay where it is.
-
-        `low`, `high`: (n,), range [rad or m]; `fastest`: (n,), speed limit [rad/s or m/s].
-        """
+        """Keep the target within `low`, `high` and `fastest`, (n,), or where it is [rad or m, and per s]."""
         self._low, self._high = np.minimum(low, self.position), np.maximum(high, self.position)
         self._fastest = fastest
 
@@ -229,11 +211,7 @@ class Target:
         return self._low, self._high
 
     def follow(self, position: Array, feed_forward: Array | None, arrival: float) -> None:
-        """Take a setpoint of the host.
-
-        `position`: (n,), as the host asks [rad or m]; `feed_forward`: (n,), torque that belongs to it; None for none
-        [Nm or N]; `arrival`: when it arrived [ticks].
-        """
+        """Take the host's `position` (n,) [rad or m] and its `feed_forward` [Nm or N]; `arrival`: when [ticks]."""
         if self._braking:
             self._spline.restart(self._resting_point())
             self._asked = self.position

@@ -23,12 +23,8 @@ class Pendulums:
         """Place them at rest. `position`: (n,), where they stand [rad]; `weight`: m g l [Nm]."""
         self._position = np.array(position, dtype=np.float64)
         self._velocity = np.zeros_like(self._position)
+        self.joint_count = self._position.size
         self._weight = weight
-
-    @property
-    def joint_count(self) -> int:
-        """Number of joints n."""
-        return self._position.size
 
     @property
     def motion(self) -> tuple[Array, Array]:

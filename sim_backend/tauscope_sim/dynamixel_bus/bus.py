@@ -37,10 +37,7 @@ def status_frame(servo: int, error: int, data: bytes) -> bytes:
 
 
 def fast_status_frame(answers: list[tuple[int, int, bytes]], servos: int, length: int) -> bytes:
-    """The common packet of a Fast Sync Read, cut off after the last answer; it is never stuffed.
-
-    `length`: data of each [bytes].
-    """
+    """The packet of a Fast Sync Read, cut off after the last answer, never stuffed. `length`: data of each [bytes]."""
     total = 1 + servos * (length + 4)
     frame = bytearray([*_HEADER, BROADCAST_ID, total & 0xFF, total >> 8, _STATUS])
     for servo, error, data in answers:

@@ -24,11 +24,7 @@ class DynamixelEmulator(Emulator):
     """An arm of emulated servos on one bus; the instants are those of the caller's clock."""
 
     def __init__(self, bus: EmulatedBus, arm: "Pendulums | PlantArm", now_s: float, *, latency_s: float = 0.0) -> None:
-        """Everything at rest. The arm stands on a stand until all its servos have had torque once.
-
-        `latency_s`: how much later than over the wire an answer reaches the master: the
-        latency of an adapter [s].
-        """
+        """Everything at rest, on a stand until all servos had torque. `latency_s`: of an adapter, for answers [s]."""
         super().__init__(now_s)
         self.bus = bus
         self.arm = arm
@@ -117,23 +113,17 @@ class DynamixelEmulator(Emulator):
             servo.take_motion(*map(float, seen))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ServoOrder(EmulatorOrder, Generic[_Servo]):
     """An arm of servos, whoever made them."""
 
     specification: ClassVar[type]
 
     servos: tuple[_Servo, ...]
-    start: tuple[float, ...]  # where the joints stand [rad or m]
-    port: str
-    control: str
     robot: str | None = None
-    scenario: str | None = None
     weight: float = 0.5  # m g l of the pendulums that they move where there is no robot file [Nm]
     paced: bool = True
     latency_s: float = 0.0  # latency of the adapter [s]
-    stepped: bool = False
-    trace: str | None = None
 
     @classmethod
     def from_json(cls, text: str) -> Self:
@@ -155,15 +145,13 @@ class ServoOrder(EmulatorOrder, Generic[_Servo]):
         # The physics take seconds to import; a test of the bus alone does without.
         from tauscope.robot import read_robot
         from tauscope_sim.dynamixel_bus.plant_arm import PlantArm
-        from tauscope_sim.scenario import Scenario
         from tauscope_sim.scenario_file import read_scenario
 
         robot = read_robot(Path(self.robot))
-        scenario = Scenario() if self.scenario is None else read_scenario(Path(self.scenario), robot)
-        return PlantArm(robot, scenario, self.start)
+        return PlantArm(robot, read_scenario(self.scenario, robot), self.start)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DynamixelOrder(ServoOrder[ServoSpecification]):
     """Dynamixel servos."""
 

@@ -26,15 +26,11 @@ class PlantArm:
     def __init__(self, robot: Robot, scenario: Scenario, position: ArrayLike) -> None:
         """Place the arm at rest. `position`: (n,), where it stands [rad or m]."""
         self._plant = scenario.plant(robot)
+        self.joint_count = robot.joint_count
         self._plant.place(position)
         self._inertia = InertiaSchedule(robot, scenario.effects)
         self._age = 0
         self._look()
-
-    @property
-    def joint_count(self) -> int:
-        """Number of joints n."""
-        return self._plant.joint_count
 
     @property
     def motion(self) -> tuple[Array, Array]:

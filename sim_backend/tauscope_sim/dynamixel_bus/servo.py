@@ -11,13 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from tauscope_sim.dynamixel_bus.control_memory import (
-    GOALS,
-    RESULT_FAIL,
-    ControlMemory,
-    ServoSpecification,
-    WriteRefusedError,
-)
+from tauscope_sim.dynamixel_bus import control_memory
 from tauscope_sim.emulation.fault_kit import FaultKind
 
 CURRENT_MODE, POSITION_MODE, EXTENDED_MODE, CURRENT_BASED_MODE = 0, 3, 4, 5
@@ -40,7 +34,7 @@ RELEASED = Demand(tracks=False)  # no torque
 class ServoLoop:
     """Goals to demands: a target that moves no faster than Profile Velocity, or plain current."""
 
-    def __init__(self, specification: ServoSpecification, memory: ControlMemory) -> None:
+    def __init__(self, specification: control_memory.ServoSpecification, memory: control_memory.ControlMemory) -> None:
         self._specification = specification
         self._memory = memory
         self._target: float | None = None
@@ -59,10 +53,7 @@ class ServoLoop:
         self._held = None
 
     def demand(self, position: float, duration_s: float) -> Demand:
-        """What the servo wants now.
-
-        `position`: of the joint, as the encoder sees it [rad or m]; `duration_s`: since the last demand [s].
-        """
+        """What the servo wants now. `position`: as the encoder sees it [rad or m]; `duration_s`: since the last [s]."""
         memory, unit = self._memory, abs(self._specification.torque_per_unit)
         limit = memory.get("Current Limit")
         if memory.get("Operating Mode") in (POSITION_MODE, EXTENDED_MODE, CURRENT_BASED_MODE):
@@ -126,9 +117,9 @@ class EmulatedServo:
         FaultKind.ENCODER_JUMP: ENCODER,
     }
 
-    def __init__(self, specification: ServoSpecification, *, seed: int = 0) -> None:
-        self.specification = specification
-        self.memory = ControlMemory(specification)
+    def __init__(self, specification: control_memory.ServoSpecification, *, seed: int = 0) -> None:
+        self.specification, self.servo = specification, specification.servo
+        self.memory = control_memory.ControlMemory(specification)
         self.encoder_offset_counts = 0
         self._loop = ServoLoop(specification, self.memory)
         self._random = random.Random(seed)  # noqa: S311 (noise, not a secret)
@@ -137,11 +128,6 @@ class EmulatedServo:
         self._heard_s = 0.0
         self._motion: tuple[float, float] | None = None
         self._seen: deque[tuple[float, float, float]] = deque(maxlen=_FILTERED_STEPS + 1)
-
-    @property
-    def servo(self) -> int:
-        """ID."""
-        return self.specification.servo
 
     @property
     def secondary(self) -> int | None:
@@ -179,19 +165,18 @@ class EmulatedServo:
         self._heard_s = now_s
 
     def write(self, address: int, data: bytes) -> None:
-        """Write to the control table and do what that means.
-
-        Raises WriteRefusedError where the servo does not take it.
-        """
+        """Write to the control table and do what that means. Raises WriteRefusedError where it is not taken."""
         memory, had_torque, was_latched = self.memory, self.has_torque, self.memory.is_latched
         written = memory.write(address, data)
-        goal_wakes = memory.get("Drive Mode") & _TORQUE_ON_BY_GOAL and any(name in GOALS for name in written)
+        goal_wakes = memory.get("Drive Mode") & _TORQUE_ON_BY_GOAL and any(
+            name in control_memory.GOALS for name in written
+        )
         if goal_wakes and not had_torque:
             memory.put("Torque Enable", 1)
         if self.has_torque and not had_torque:
             if self._is_shut_down:
                 memory.put("Torque Enable", 0)
-                raise WriteRefusedError(RESULT_FAIL)
+                raise control_memory.WriteRefusedError(control_memory.RESULT_FAIL)
             self._loop.release()
         if was_latched and not memory.is_latched:
             self._loop.resume()
@@ -206,20 +191,17 @@ class EmulatedServo:
     def act(self) -> None:
         """Carry out the write that was kept. Raises WriteRefusedError where none was kept, or it is refused."""
         if self._registered is None:
-            raise WriteRefusedError(2)
+            raise control_memory.WriteRefusedError(2)
         registered, self._registered = self._registered, None
         self.memory.put("Registered Instruction", 0)
         self.write(*registered)
 
     def clear(self, what: bytes) -> None:
-        """Carry out the instruction Clear: an error of the Y series, where its cause is gone.
-
-        Raises WriteRefusedError where the error stays, or this servo knows no such thing.
-        """
+        """Carry out Clear: an error of the Y series whose cause is gone. Raises WriteRefusedError where it stays."""
         code = self.memory.get("Error Code")
         is_hot = self.memory.get("Present Motor Temperature") > self.memory.get("Motor Temperature Limit")
         if "Error Code" not in self.memory or what != _ERROR_TO_CLEAR or code in _Y_LASTING or (code == 4 and is_hot):
-            raise WriteRefusedError(RESULT_FAIL)
+            raise control_memory.WriteRefusedError(control_memory.RESULT_FAIL)
         if code == _Y_WATCHDOG_CODE:
             self.memory.put("Bus Watchdog", 0)
             self._loop.resume()
@@ -244,10 +226,7 @@ class EmulatedServo:
             self._loop.release()
 
     def demand(self, position: float, now_s: float, duration_s: float) -> Demand:
-        """What the servo wants of its joint for the next stretch of time.
-
-        `position`: of the joint [rad or m]; `duration_s`: since the last call [s].
-        """
+        """What the servo wants for the next stretch. `position`: [rad or m]; `duration_s`: since the last call [s]."""
         if not self.has_torque:
             self._heard_s = now_s
             return RELEASED
@@ -258,10 +237,7 @@ class EmulatedServo:
         return replace(demand, position=demand.position - jump) if jump else demand
 
     def take_motion(self, position: float, velocity: float, torque: float) -> None:
-        """See the joint, and the torque that the servo exerts on it.
-
-        `position`: [rad or m]; `velocity`: [rad/s or m/s]; `torque`: [Nm or N].
-        """
+        """See the joint, and the servo's torque on it. [rad or m], [rad/s or m/s], [Nm or N]."""
         # Torque is that of the period that ends here; position and velocity are taken at its middle too.
         before, speed_before = self._motion or (position, velocity)
         current = torque / self.specification.torque_per_unit

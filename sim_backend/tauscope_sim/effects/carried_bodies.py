@@ -41,12 +41,7 @@ class Payload(Effect):
 
 
 class PayloadChange(Payload):
-    """A body at the last link while start ≤ t < end.
-
-    `mass`: m [kg].
-    `offset`: r [m].
-    `moments`: diagonal of I [kg m²].
-    """
+    """A body at the last link while start ≤ t < end: `mass` m [kg], `offset` r [m], `moments` diag I [kg m²]."""
 
     effect_id: ClassVar[str] = "payload_change"
     start: Number = 0.0  # when it is picked up; zero or less: it is there from the beginning [s]

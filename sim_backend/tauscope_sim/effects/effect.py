@@ -101,10 +101,7 @@ class JointEffect(Effect):
 
 
 class SmoothSignEffect(JointEffect):
-    """An effect of one joint in which A(v) = (2/π) arctan(K_v v) stands for the sign of velocity.
-
-    `joint`: its number, counted from 1.
-    """
+    """An effect of one `joint`, from 1, in which A(v) = (2/π) arctan(K_v v) stands for the sign of velocity."""
 
     k_v: Positive | None = None  # K_v; that of the joint's friction_shape where None [s/rad or s/m]
 

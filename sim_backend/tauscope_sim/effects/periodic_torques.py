@@ -43,11 +43,7 @@ class AngleHarmonics(JointEffect):
 
 
 class Cogging(AngleHarmonics, JointLaw):
-    """τ = Σ a_i sin(k_i q' + φ_i).
-
-    `amplitude`: a_i, a number or one an order [Nm or N].
-    `phase`: φ_i, a number or one an order [rad].
-    """
+    """τ = Σ a_i sin(k_i q' + φ_i). `amplitude`: a_i [Nm or N], `phase`: φ_i [rad]: a number, or one an order."""
 
     effect_id: ClassVar[str] = "cogging"
 
@@ -57,11 +53,7 @@ class Cogging(AngleHarmonics, JointLaw):
 
 
 class TorqueRipple(AngleHarmonics):
-    """τ = L Σ a_i sin(k_i q' + φ_i).
-
-    `amplitude`: a_i, a number or one an order [Nm/Nm].
-    `phase`: φ_i, a number or one an order [rad].
-    """
+    """τ = L Σ a_i sin(k_i q' + φ_i). `amplitude`: a_i [Nm/Nm], `phase`: φ_i [rad]: a number, or one an order."""
 
     effect_id: ClassVar[str] = "torque_ripple"
 

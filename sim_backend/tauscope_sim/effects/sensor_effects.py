@@ -15,10 +15,7 @@ class Channel(Protocol):
     """A sensor effect at work: it sees the samples in the order of time, and only those of the past."""
 
     def pass_on(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
-        """Position and torque that are recorded in place of a sample's, each (n,) [rad or m; Nm or N].
-
-        `time`: of the sample [s]; `position`: (n,) [rad or m]; `torque`: (n,) [Nm or N].
-        """
+        """What is recorded at `time` [s] in place of `position` [rad or m] and `torque` [Nm or N], (n,)."""
         ...
 
 

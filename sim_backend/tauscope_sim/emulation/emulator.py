@@ -9,7 +9,7 @@ import struct
 import tty
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from math import ceil
 from typing import Any, Protocol, Self
 
@@ -24,10 +24,7 @@ ALL_STEPS = ceil(LONGEST_CATCH_UP_S / STEP_S)  # as many as can be due
 
 
 class DeviceClock:
-    """How far devices have come; what a machine that stood still made them miss is lost, and told.
-
-    `lost_s`: time that was never stepped through [s].
-    """
+    """How far devices have come. `lost_s`: never stepped through, for the machine stood still; it is told [s]."""
 
     def __init__(self, now_s: float) -> None:
         self.tick = round(now_s / STEP_S)
@@ -149,15 +146,12 @@ class Port(Protocol):
 
     def read(self) -> bytes | None:
         """What a master sent; None where no master has it open."""
-        ...
 
     def write(self, data: bytes) -> None:
         """Send to the master; lost where there is none, or where it reads nothing."""
-        ...
 
     def close(self) -> None:
         """Hang up."""
-        ...
 
 
 _TCGETS2 = 0x802C542A
@@ -165,10 +159,7 @@ _TERMIOS2 = "=4I20B2I"
 
 
 class PseudoTerminal:
-    """The near end, a `Port`; a master opens the far end by the name that was linked to it.
-
-    The far end is not kept open here, so that whoever has it open is a master.
-    """
+    """The near end, a `Port`; a master opens the far end, which is not kept open here, by the name linked to it."""
 
     def __init__(self, link: str) -> None:
         self._near, far = os.openpty()
@@ -213,13 +204,16 @@ class PseudoTerminal:
             os.unlink(self._link)
 
 
+@dataclass(frozen=True, kw_only=True)
 class EmulatorOrder(ABC):
-    """The order that starts an emulator process; subclasses are frozen dataclasses that JSON can hold."""
+    """The order that starts an emulator process; JSON can hold it."""
 
+    start: tuple[float, ...]  # where the joints stand [rad or m]
     port: str  # what the master opens
     control: str  # Unix socket for the test
-    stepped: bool  # whether time passes only when a test says so; else it is the machine's
-    trace: str | None  # file that what the devices do is appended to
+    scenario: str | None = None
+    stepped: bool = False  # whether time passes only when a test says so; else it is the machine's
+    trace: str | None = None  # file that what the devices do is appended to
 
     @property
     def kind(self) -> str:
@@ -234,7 +228,10 @@ class EmulatorOrder(ABC):
     def from_json(cls, text: str) -> Self:
         """The order in a text."""
         document = json.loads(text)
-        return cls(**{key: tuple(value) if isinstance(value, list) else value for key, value in document.items()})
+        fields: dict[str, Any] = {
+            key: tuple(value) if isinstance(value, list) else value for key, value in document.items()
+        }
+        return cls(**fields)
 
     def open_port(self) -> Port:
         """What the master opens: a pseudo terminal."""

@@ -26,11 +26,7 @@ class FaultKind(StrEnum):
 
 @dataclass(frozen=True)
 class InjectedFault:
-    """One fault.
-
-    `at_s`: when, by the emulator's clock, and in what a test asks for counted from then; at once where that has passed
-        [s].
-    """
+    """One fault. `at_s`: when, by the emulator's clock; a test's counts from then; at once where it has passed [s]."""
 
     kind: FaultKind
     device: int = 0

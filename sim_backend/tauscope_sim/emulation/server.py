@@ -146,11 +146,7 @@ class EmulatorServer:
         return ready
 
     def _serve_master(self) -> None:
-        """Take what the master sent, let time pass, send what has arrived at the master.
-
-        By the machine's clock no answer waits for more than the step that is under way: a master takes what comes much
-        later than usual for no sample.
-        """
+        """Take what the master sent, let time pass, send what is due: none waits for more than a step."""
         pieces, now_s = self._receive()
         for piece, arrival_s in pieces:
             if self._emulator.hears(self._port.baud):

@@ -24,11 +24,7 @@ from tauscope_sim.plant.term import (
 
 
 def compliant_transmissions(effects: Sequence[PhysicalEffect], rotor_inertia: Array) -> dict[int, Transmission]:
-    """Compliant transmissions by joint, counted from 0.
-
-    Raises ScenarioError where two effects make the same joint compliant, or both give it a rotor.
-    `rotor_inertia`: (n,), that effects give to the motors of rigid joints [kg m² or kg].
-    """
+    """Compliant transmissions by joint, from 0. Raises ScenarioError. `rotor_inertia`: (n,) [kg m² or kg]."""
     found: dict[int, Transmission] = {}
     for transmission in (effect.transmission() for effect in effects):
         if transmission is None:
@@ -72,10 +68,7 @@ class Compliance:
                 matrix[motor, joint] -= felt * slope
 
     def twist_at_rest(self, load: list[float]) -> list[float]:
-        """Twist of each compliant joint at rest [rad or m].
-
-        `load`: torque that the links need, one a joint [Nm or N].
-        """
+        """Twist of each compliant joint at rest [rad or m]. `load`: torque that the links need [Nm or N]."""
         return [part.twist_at_rest(load[joint]) for joint, _, part in self._parts]
 
 
@@ -99,10 +92,7 @@ class _Law(NamedTuple):
 
 
 class StaticFriction(Term):
-    """Friction τ_f = τ_s (2/π) arctan(K_v v) + τ_sc (2/π) arctan(δ v) + τ_v v of every joint, v the motor's velocity.
-
-    Raises RobotFileError where a shape constant that is needed is missing.
-    """
+    """τ_f = τ_s (2/π) arctan(K_v v) + τ_sc (2/π) arctan(δ v) + τ_v v; RobotFileError without a shape constant."""
 
     def __init__(
         self,
@@ -134,13 +124,9 @@ class StaticFriction(Term):
 class EquationsOfMotion:
     """Accelerations and rates of the plant, and their linearisation.
 
-    A rigid joint has one coordinate and obeys the equation of `tauscope_sim.plant.term`. A compliant one has two, link
-    and motor, with the transmission's torque T between them:
-
-        H(q) q̈ + h + c + link = T,      J θ̈ + friction + motor + T (1 + g) + |T| f = u.
-
-    Raises RobotFileError where the robot file lacks what the simulation needs.
-    Raises ScenarioError where effects contradict one another.
+    A rigid joint obeys the equation of `tauscope_sim.plant.term`; a compliant one has two coordinates, link and motor,
+    with T between them: H(q) q̈ + h + c + link = T, J θ̈ + friction + motor + T (1 + g) + |T| f = u. Raises
+    RobotFileError, ScenarioError where robot or effects do not fit.
     """
 
     def __init__(self, robot: Robot, effects: Sequence[PhysicalEffect]) -> None:
@@ -188,10 +174,7 @@ class EquationsOfMotion:
         return temperature
 
     def evaluate(self, time: float, vector: list[float], drive: list[float]) -> list[float]:
-        """Rate of change of y = [p, v, z], 2N + m numbers.
-
-        `time`: t [s]; `drive`: u, torque of the drives on the joint's side, one a joint [Nm or N].
-        """
+        """Rate of change of y = [p, v, z], 2N + m. `time`: t [s]; `drive`: u, the drives' joint torque [Nm or N]."""
         size = self._size
         link_side = self.load_at(time, vector)
         forces, moment = self._forces, self._moment
@@ -225,10 +208,7 @@ class EquationsOfMotion:
         return self._matrix, slopes
 
     def load_at(self, time: float, vector: list[float]) -> list[float]:
-        """Move the links, sum the terms' torque into `Forces`, and return h + c + link, one a joint [Nm or N].
-
-        That is what links need from their transmissions when they do not accelerate. `time`: t [s].
-        """
+        """Move the links at t [s], sum the terms into `Forces`; h + c + link, one a joint [Nm or N]."""
         count, size = self._count, self._size
         moment, forces = self._moment, self._forces
         self.bodies.update(vector[:count], vector[size : size + count])

@@ -19,11 +19,7 @@ SETTLED = 1e-13  # change of a link's position that ends the iteration [rad or m
 
 
 def settled(equations: EquationsOfMotion, motor_position: Array) -> Array:
-    """State of an arm at rest with q_j = θ_j - twist_j(load_j(q)), found by iteration.
-
-    Raises ScenarioError where a transmission is too soft to carry its link.
-    `motor_position`: (n,), θ [rad or m]. Returns (2N + m,), y: positions, zero velocities, the effects' initial states.
-    """
+    """An arm at rest, (2N + m,): q_j = θ_j - twist_j(load_j(q)). Raises ScenarioError. `motor_position`: θ, (n,)."""
     compliant = list(equations.coordinates.compliant)
     position = np.concatenate([motor_position, motor_position[compliant]])
     vector = np.concatenate([position, np.zeros_like(position), equations.initial_states()])
@@ -75,14 +71,10 @@ class PlantState:
 class Plant:
     """Forward physics of an arm: rigid bodies, the robot file's static friction, and concealed effects.
 
-    Steps are at most `step_s` long. Where friction reverses, teeth meet or a bristle turns, a step is divided until its
-    estimated error is below `TOLERANCE` × (step_s / `STEP`)²: halving `step_s` halves every sub-step, and the result
-    converges with the square of `step_s`. No step crosses an instant at which an effect begins or ends.
-
-    `step_s`: longest step of the integration [s].
-
-    Raises RobotFileError where the robot file lacks what the simulation needs.
-    Raises ScenarioError where effects contradict one another or the robot.
+    Steps are at most `step_s` [s]. Where friction reverses, teeth meet or a bristle turns, a step is divided until its
+    estimated error is below `TOLERANCE` × (step_s / `STEP`)²: the result converges with the square of `step_s`. None
+    crosses an instant at which an effect begins or ends. Raises RobotFileError, ScenarioError where robot or effects do
+    not fit.
     """
 
     def __init__(self, robot: Robot, effects: Sequence[PhysicalEffect] = (), *, step_s: float = STEP) -> None:
@@ -90,6 +82,7 @@ class Plant:
             raise ScenarioError(f"step_s is {step_s}; give a positive duration")
         self._equations = EquationsOfMotion(robot, effects)
         self._coordinates = self._equations.coordinates
+        self.joint_count = robot.joint_count
         self._motors = self._coordinates.motors
         self._step = RosenbrockStep(self._equations)
         self._longest = step_s
@@ -97,11 +90,6 @@ class Plant:
         self._shortest = SHORTEST_PART * step_s
         self._part = step_s
         self.place(np.zeros(robot.joint_count))
-
-    @property
-    def joint_count(self) -> int:
-        """Number of joints n."""
-        return self._coordinates.joint_count
 
     @property
     def motor_motion(self) -> tuple[Array, Array]:
@@ -122,11 +110,7 @@ class Plant:
         )
 
     def place(self, position: ArrayLike) -> None:
-        """Start afresh at time zero: motors at rest in a place, compliant links hanging still, effects as when new.
-
-        Raises ScenarioError where that is no place, or a transmission is too soft to carry its link.
-        `position`: (n,), of the motors, in joint units [rad or m].
-        """
+        """Start afresh at rest. Raises ScenarioError: no such place, or too soft. `position`: (n,), of the motors."""
         motors = np.asarray(position, dtype=np.float64)
         if motors.shape != (self.joint_count,) or not np.all(np.isfinite(motors)):
             raise ScenarioError(f"position {motors} is not one finite number for each of {self.joint_count} joints")
@@ -138,11 +122,7 @@ class Plant:
         self._part = self._longest
 
     def advance(self, motor_torque: ArrayLike, duration_s: float) -> None:
-        """Let time pass under constant torque.
-
-        Raises ScenarioError where the duration is negative, or the motion grows beyond all bounds.
-        `motor_torque`: (n,), of the drives, on the joint's side of the gear [Nm or N].
-        """
+        """Let time pass under `motor_torque`, (n,) [Nm or N]. Raises ScenarioError: motion without bounds."""
         if not duration_s >= 0.0:
             raise ScenarioError(f"duration_s is {duration_s}; time passes forwards only")
         drive = np.asarray(motor_torque, dtype=np.float64).tolist()

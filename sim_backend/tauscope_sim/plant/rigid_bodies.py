@@ -56,10 +56,7 @@ class RigidBodies:
         return self._ratios.T @ self._matrix @ self._ratios + self._rotors if self._is_coupled else self._matrix
 
     def accelerations(self, torque: Array | list[float]) -> Array:
-        """Solve H(q) q̈ = τ, shape (n,): a view that the next call overwrites [rad/s² or m/s²].
-
-        `torque`: (n,), τ [Nm or N].
-        """
+        """Solve H(q) q̈ = τ, (n,): a view that the next call overwrites [rad/s² or m/s²]. `torque`: τ [Nm or N]."""
         if self._is_coupled:
             return np.asarray(np.linalg.solve(self.mass_matrix(), torque), dtype=np.float64)
         self._right_side[0] = torque
@@ -67,10 +64,7 @@ class RigidBodies:
         return self._accelerations
 
     def tool_jacobian(self, offset: Array) -> Array:
-        """Jacobian of a point that moves with the last link, in base axes, shape (3, n) [m/rad or 1].
-
-        `offset`: (3,), the point in the last link's frame [m].
-        """
+        """Jacobian of a point of the last link, in base axes, (3, n) [m/rad or 1]. `offset`: (3,), in its frame [m]."""
         tool = len(self._position)
         point = self._data.xpos[tool] + self._data.xmat[tool].reshape(3, 3) @ offset
         jacobian = np.zeros((3, tool))
@@ -78,11 +72,7 @@ class RigidBodies:
         return jacobian @ self._ratios if self._is_coupled else jacobian
 
     def carry(self, carrier: object, payload: Array | None) -> None:
-        """Change what the last link carries; it takes the payload over at its own speed, without an impact.
-
-        `payload`: (10,), standard parameters in the last link's frame, in the order of
-        `tauscope.robot.robot.STANDARD_PARAMETERS`; None drops it.
-        """
+        """Change what the last link carries, without impact. `payload`: (10,), `STANDARD_PARAMETERS`; None drops it."""
         self._carried.pop(id(carrier), None)
         if payload is not None:
             self._carried[id(carrier)] = payload

@@ -54,10 +54,7 @@ class RosenbrockStep:
         self._by_position: Array | None = None
 
     def begin(self, time: float, vector: list[float], drive: list[float]) -> None:
-        """Evaluate and linearise where steps shall start; a step may then be tried with several lengths.
-
-        `time`: t [s]; `drive`: torque of the drives, one a joint, constant during the step [Nm or N].
-        """
+        """Evaluate and linearise at t [s], for steps of several lengths. `drive`: one a joint, constant [Nm or N]."""
         size = self._size
         self._time, self._vector, self._drive = time, vector, drive
         self._rate = self._equations.evaluate(time, vector, drive)

@@ -112,10 +112,7 @@ class Term:
         return ()
 
     def begin(self, time: float, bodies: RigidBodies) -> None:
-        """Take note that an interval without events begins.
-
-        `time`: its first instant: the placing of the arm, or one of `event_times` [s].
-        """
+        """Take note that an interval without events begins at `time`: the placing, or one of `event_times` [s]."""
 
     def act(self, moment: Moment, forces: Forces) -> None:
         """Add the torque that the drives have to overcome."""
@@ -144,17 +141,11 @@ class Transmission(Protocol):
         ...
 
     def torque(self, twist: float, twist_rate: float) -> float:
-        """Torque that the link receives [Nm or N].
-
-        `twist`: motor position less link position [rad or m]; `twist_rate`: its rate [rad/s or m/s].
-        """
+        """Torque on the link [Nm or N]. `twist`: motor less link position [rad or m]; `twist_rate`: its rate."""
         ...
 
     def torque_slopes(self, twist: float, twist_rate: float) -> tuple[float, float]:
-        """Derivatives of the torque with respect to twist [Nm/rad] and its rate [Nm s/rad].
-
-        `twist`: motor position less link position [rad or m]; `twist_rate`: its rate [rad/s or m/s].
-        """
+        """∂τ/∂twist [Nm/rad] and ∂τ/∂rate [Nm s/rad]. `twist`: motor less link position [rad or m]."""
         ...
 
     def twist_at_rest(self, torque: float) -> float:

@@ -17,7 +17,7 @@ from tauscope_drivers import ControlMode, DriveLimits, Setpoint, StopPolicy
 from tauscope_drivers.canopen.arm import CanopenArm
 from tauscope_drivers.canopen.doctor import scan_bus
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_sim.driver.simulated_arm import VirtualClock
+from tauscope_sim.driver import VirtualClock
 
 durand = pytest.importorskip("durand")
 

@@ -9,7 +9,7 @@ from drivers.wired_port import WiredPort
 from tauscope_drivers import ControlMode, StopPolicy
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.arm import DynamixelArm
-from tauscope_drivers.dynamixel.original_settings import FOLDER, OriginalSettings
+from tauscope_drivers.dynamixel.session import FOLDER, OriginalSettings
 from tauscope_drivers.limits import stated_limits
 from tauscope_sim.dynamixel_bus import ServoSpecification
 from tauscope_sim.dynamixel_bus.servo import EmulatedServo

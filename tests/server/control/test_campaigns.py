@@ -70,9 +70,8 @@ class Bench:
         self.claims = DeviceClaims(4)
         items = ItemStore(folder / "runs", "run")
         self.runs = RunManager(items, self.recordings, start, self.claims, lambda: True)
-        dependencies = CampaignDependencies(
-            self.jobs, self.excitations, self.identifications, self.diagnoses, self.runs, self.recordings
-        )
+        by_noun = {kind.items.noun: kind for kind in kinds}
+        dependencies = CampaignDependencies(self.jobs, by_noun, self.runs, self.recordings)
         self.manager = CampaignManager(ItemStore(folder / "campaigns", "campaign"), dependencies)
 
     def submit(self, **changes: object) -> str:

@@ -50,7 +50,7 @@ class Bench:
         return RunWorkspace(self.manager.items.folder(run))
 
     def state(self, run: str) -> RunState:
-        record = self.workspace(run).read_run()
+        record = self.workspace(run).read_record()
         assert record is not None
         return record.state
 

@@ -102,7 +102,7 @@ def test_a_campaign_all_the_way(
     identification = status["links"]["identification"]
     assert_problem(arm.delete(identification), "in-use", 409)  # it has become the active model
     services = arm.app.state.services  # pyright: ignore[reportAttributeAccessIssue]
-    services.jobs.cancel_or_remove(services.identifications, identification.rsplit("/", 1)[1])
+    services.jobs.cancel_or_remove(services.kinds["identification"], identification.rsplit("/", 1)[1])
     assert arm.get(campaign["links"]["self"]).json()["steps"][-1]["state"] == "gone"
     assert_problem(arm.get(status["links"]["result"]), "not-found", 404)
     wait_until(lambda: arm.delete(campaign["links"]["self"]).status_code == 204)

@@ -16,7 +16,7 @@ from server.http.problem_check import assert_problem
 from server.queue.executors import InlineExecutor, ManualExecutor
 from tauscope.server.http import Settings, create_app
 from tauscope.server.http.services import Services
-from tauscope.server.http.tasks import events as event_routes
+from tauscope.server.http.tasks import router as event_routes
 from tauscope.server.http.tasks.event_feeds import EventFeeds
 from tauscope.server.queue.job_folder import JobRecord, JobState, Workspace
 from tauscope.server.store.data_folder import utc_now

@@ -87,13 +87,13 @@ def test_a_model_waits_for_its_campaign_and_is_judged_by_its_diagnosis(
 ) -> None:
     services: Services = paper.app.state.services  # pyright: ignore[reportAttributeAccessIssue]
     keeper, identifier = services.models, models(paper)[0]["id"]
-    diagnoses, campaigns = services.diagnoses.items, services.campaigns.items
+    diagnoses, campaigns = services.items["diagnosis"], services.campaigns.items
     content = b'{"schema": "tauscope.diagnosis/1", "verdict": "explained"}'
     folder = diagnoses.stage()
     (folder / "result.json").write_bytes(content)
     made = CampaignLinks(identification=identifier, diagnosis=diagnoses.publish(folder))
     folder, record = campaigns.stage(), JobRecord(state=JobState.RUNNING, created=NOON)
-    CampaignWorkspace(folder).write_made(made)
+    CampaignWorkspace(folder).record_made(**dict(made))
     CampaignWorkspace(folder).write_record(record)
     campaign = CampaignWorkspace(campaigns.folder(campaigns.publish(folder)))
     judged: list[Candidate] = []
@@ -151,7 +151,7 @@ def test_an_order_that_names_an_unknown_robot_holds_up_no_service(
     """One flipped bit of a name, in an identification that was not judged yet when the service was killed."""
     services = paper.app.state.services  # pyright: ignore[reportAttributeAccessIssue]
     keeper, damaged = services.models, models(paper)[0]["id"]
-    order = services.identifications.items.folder(damaged) / "order.json"
+    order = services.items["identification"].folder(damaged) / "order.json"
     order.write_text(order.read_text().replace(f'"{ROBOT}"', '"paper-aro"'))
     monkeypatch.setattr(keeper.history, "list_unjudged", lambda _site: [damaged])
     assert keeper.judge_new() == keeper.judge_new() == []

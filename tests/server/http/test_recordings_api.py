@@ -87,7 +87,7 @@ def test_a_recording_of_other_joints(client: TestClient) -> None:
 @pytest.mark.usefixtures("reader_processes")
 def test_a_check_whose_process_dies_is_a_problem(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     client.post(RECORDINGS, files={"file": ("a.csv", CSV)})
-    monkeypatch.setattr("tauscope.server.http.recordings.check_kept_recording", Deadly())
+    monkeypatch.setattr("tauscope.server.queue.received_files.check_kept_recording", Deadly())
     assert_problem(client.get(f"{RECORDINGS}/a.csv/report"), "worker-lost", 500)
 
 

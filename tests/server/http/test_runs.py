@@ -164,8 +164,8 @@ def test_stop_works_while_everything_else_is_stuck(
         control = controls.next()
         control.go(RunState.RUNNING)
         services = app.state.services
-        monkeypatch.setattr(services.identifications.items, "identifiers", hang)
-        monkeypatch.setattr(RunWorkspace, "read_run", hang)
+        monkeypatch.setattr(services.items["identification"], "identifiers", hang)
+        monkeypatch.setattr(RunWorkspace, "read_record", hang)
         threads = [threading.Thread(target=lambda: client.get(IDENTIFICATIONS)) for _ in range(45)]
         for thread in threads:
             thread.start()

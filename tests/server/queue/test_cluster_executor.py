@@ -19,11 +19,11 @@ from patience import eventually
 from server.queue.paper_files import PAPER_ROBOT, write_recording
 from server.queue.waiting import wait_until
 from tauscope.errors import StoreError
-from tauscope.server.queue.analyses import IdentificationOrder, IdentificationWorkspace, run_identification
+from tauscope.server.queue.analyses import IdentificationOrder, IdentificationWorkspace
 from tauscope.server.queue.cluster_executor import SCHEDULER, ClusterExecutor, ClusterUnavailableError, open_executor
 from tauscope.server.queue.job_folder import JobState, Workspace
 from tauscope.server.queue.queue import JobKind, JobQueue
-from tauscope.server.queue.task_job import OrderedRecording
+from tauscope.server.queue.task_job import OrderedRecording, perform_job
 from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.files import hash_file
@@ -100,7 +100,7 @@ class TestOnACluster:
         ordered = OrderedRecording(name="a.csv", origin="server", sha256=hash_file(recording))
         order = IdentificationOrder(robot_file="arm.yaml", robot_name="paper-arm", recordings=(ordered,))
         workspace.write_order(order)
-        future: Future[object] = executor.submit(run_identification, workspace.folder, server_recordings=tmp_path)
+        future: Future[object] = executor.submit(perform_job, IdentificationWorkspace, tmp_path, workspace.folder)
         wait([future], 120)
         assert future.result(0) is None
         assert workspace.read_result() is not None

@@ -8,8 +8,8 @@ import pytest
 from server.queue.paper_files import PAPER_ROBOT, write_recording
 from tauscope.export.formats import EXPORT_FILES, ExportFormat
 from tauscope.identification import IdentificationDocument
-from tauscope.server.queue.analyses import IdentificationOrder, IdentificationWorkspace, run_identification
-from tauscope.server.queue.task_job import OrderedRecording
+from tauscope.server.queue.analyses import IdentificationOrder, IdentificationWorkspace
+from tauscope.server.queue.task_job import OrderedRecording, perform_job
 from tauscope.server.store.files import hash_file
 from tauscope.tasks import identify as task
 from tauscope.tasks.identify import IdentificationOptions
@@ -56,7 +56,7 @@ def test_result_exports_and_steps(workspace: IdentificationWorkspace, server: Pa
     train = write_recording(workspace.uploads("recordings") / "train.csv", seed=1)
     test = write_recording(server / "test.csv", seed=2)
     order(workspace, train, held_out=(test,))
-    assert run_identification(workspace.folder, server) is None
+    assert perform_job(IdentificationWorkspace, server, workspace.folder) is None
     content = workspace.read_result()
     assert content is not None
     document = IdentificationDocument.model_validate_json(content)
@@ -90,7 +90,7 @@ def test_a_urdf_that_came_with_the_robot_is_patched(workspace: IdentificationWor
         encoding="utf-8",
     )
     order(workspace, _slider_recording(workspace.uploads("recordings") / "a.csv"))
-    assert run_identification(workspace.folder, server) is None
+    assert perform_job(IdentificationWorkspace, server, workspace.folder) is None
     assert workspace.refused_exports() == {}
     urdf = workspace.read_export("model.urdf").decode()
     assert "<!-- kept -->" in urdf
@@ -124,7 +124,7 @@ def test_a_broken_recording_is_named_with_line_and_column_and_without_the_server
     path = write_recording(workspace.uploads("recordings") / "broken.csv", seed=1)
     row = path.read_text(encoding="utf-8").splitlines()[99].split(",")
     order(workspace, spoil(path, 100, ",".join([*row[:3], "oops", *row[4:]])))
-    problem = run_identification(workspace.folder, server)
+    problem = perform_job(IdentificationWorkspace, server, workspace.folder)
     assert problem is not None
     assert problem.code == "recording"
     assert problem.detail.startswith("broken.csv: line 100, column q3: ")
@@ -135,7 +135,7 @@ def test_a_broken_recording_is_named_with_line_and_column_and_without_the_server
 
 def test_a_recording_of_another_robot(workspace: IdentificationWorkspace, server: Path) -> None:
     order(workspace, _slider_recording(server / "slider.csv"))
-    problem = run_identification(workspace.folder, server)
+    problem = perform_job(IdentificationWorkspace, server, workspace.folder)
     assert problem is not None
     assert problem.code == "recording-mismatch"
     assert problem.detail.startswith("slider.csv: ")
@@ -153,14 +153,14 @@ def test_a_recording_on_the_server_that_changed_meanwhile(
         path.rename(server / "b.csv")
     if change == "replaced by a link":
         path.symlink_to(server / "b.csv")
-    problem = run_identification(workspace.folder, server)
+    problem = perform_job(IdentificationWorkspace, server, workspace.folder)
     assert problem is not None
     assert (problem.code, problem.detail.split(":")[0]) == ("recording", "a.csv")
     assert "changed or removed" in problem.detail
 
 
 def test_a_damaged_order(workspace: IdentificationWorkspace, server: Path) -> None:
-    problem = run_identification(workspace.folder, server)
+    problem = perform_job(IdentificationWorkspace, server, workspace.folder)
     assert problem is not None
     assert "order.json" in problem.detail
 
@@ -179,7 +179,7 @@ def test_cancelled_work_stops_at_its_next_step(
             self.ask_to_stop()
 
     monkeypatch.setattr(IdentificationWorkspace, "write_step", cancel_at_the_second)
-    problem = run_identification(workspace.folder, server)
+    problem = perform_job(IdentificationWorkspace, server, workspace.folder)
     assert problem is not None
     assert problem.code == "cancelled"
     assert len(steps) == 2
@@ -196,7 +196,7 @@ def test_unforeseen_failures_are_not_swallowed(
 
     monkeypatch.setattr(task, "read_robot", fail)
     with pytest.raises(ZeroDivisionError):
-        run_identification(workspace.folder, server)
+        perform_job(IdentificationWorkspace, server, workspace.folder)
 
 
 @pytest.mark.parametrize("damage", [b"", b"[]", b"{}", b'{"schema": "other/1"}', b"\xff", b"[" * 100_000])

@@ -19,13 +19,21 @@ START = (0.1, 0.2, 0.3)
 def servo_order(folder: Path) -> DynamixelOrder:
     servos = tuple(ServoSpecification(number) for number in (1, 2, 3))
     port, control, trace = (str(folder / name) for name in ("port", "control", "trace"))
-    return DynamixelOrder(servos, START, port, control, stepped=True, trace=trace)
+    return DynamixelOrder(servos=servos, start=START, port=port, control=control, stepped=True, trace=trace)
 
 
 def drive_order(folder: Path) -> CanOrder:
     robot = write_canopen_robot(Path(tauscope_sim.examples.__file__).with_name("paper_arm.yaml"), folder)
     port, control, trace = (str(folder / name) for name in ("port", "control", "trace"))
-    return CanOrder(str(robot), START, port, control, (RATED_TORQUE_MNM,) * 3, stepped=True, trace=trace)
+    return CanOrder(
+        robot=str(robot),
+        start=START,
+        port=port,
+        control=control,
+        rated_torque_mnm=(RATED_TORQUE_MNM,) * 3,
+        stepped=True,
+        trace=trace,
+    )
 
 
 @pytest.fixture(scope="module", params=[servo_order, drive_order], ids=["dynamixel", "canopen"])

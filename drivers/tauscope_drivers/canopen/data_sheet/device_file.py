@@ -44,10 +44,7 @@ class DataSheetError(ValueError):
 
 
 def read_sections(text: str) -> Sections:
-    """Sections that describe the device and its objects; compact arrays are written out.
-
-    Raises DataSheetError where it is no such file; names the line or the section.
-    """
+    """Sections of the device and its objects, compact arrays written out. Raises DataSheetError: no such file."""
     # No section is everybody's default, and no indented line goes on with the one before.
     parser = configparser.RawConfigParser(inline_comment_prefixes=(";",), default_section="\0")
     try:
@@ -81,11 +78,7 @@ def _section_name(given: str) -> str | None:
 
 
 def parse_number(text: str, node_id: int | None = None) -> int | None:
-    """A whole number as files write it; None where it is none.
-
-    Decimal, ``0x`` hexadecimal, octal by a leading zero (CiA 306), hexadecimal digits without ``0x``, and ``$NODEID``
-    alone or added to one of these.
-    """
+    """A whole number as files write it (CiA 306): decimal, hexadecimal also without 0x, octal, ``$NODEID``."""
     number = text.replace(" ", "").upper()
     if "$NODEID" in number:
         if node_id is None:
@@ -307,10 +300,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Settings:
-    """The values of a DCF file; none of an EDS file.
-
-    `torque_cap`: largest torque (0x6072), which the driver sets itself and never above this [‰ of the rated torque].
-    """
+    """A DCF file's values; none of an EDS file. `torque_cap`: 0x6072, never exceeded [‰ of rated]."""
 
     written: tuple[Setting, ...]
     left_out: Mapping[str, tuple[DescribedObject, ...]]
@@ -318,10 +308,7 @@ class Settings:
 
 
 def settings_of(file: DeviceFile) -> Settings:
-    """Values that a drive is given before it is commissioned.
-
-    Raises DataSheetError where a value is not of its object's type; names both.
-    """
+    """Values that a drive gets before it is commissioned. Raises DataSheetError where one is not of its type."""
     written: list[Setting] = []
     left_out: dict[str, tuple[DescribedObject, ...]] = {}
     for _, described in sorted(file.objects.items()):

@@ -138,10 +138,7 @@ def _refuse(flaws: list[str]) -> None:
 
 
 def require_identity(file: DeviceFile, dictionary: NodeDictionary, place: str) -> None:
-    """Refuse a drive of another vendor, product or revision than its file states; what it does not tell passes.
-
-    Raises DriverError ``refused``, which names what differs.
-    """
+    """Refuse a drive that is not the one of its file. Raises DriverError ``refused``: the difference."""
     identity = ((objects.VENDOR, file.vendor), (objects.PRODUCT, file.product), (objects.REVISION, file.revision))
     for entry, stated in identity:
         told = None if stated is None else dictionary.read_optional(entry)

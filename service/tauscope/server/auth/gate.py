@@ -161,8 +161,9 @@ class AuditedRequests(HttpMiddleware):
         method, path = scope["method"], scope["path"]
         actor, action = find_caller(scope).name, f"{method} {path[:300]}"
         address = (scope.get("client") or (None,))[0]
-        if _is_asked_first(method, path):
-            # Where the log takes nothing, nothing moves: the failure ends the request.
+        needed = find_needed_scope(method, path)
+        # Never so for a stop. Where the log takes nothing, nothing moves: the failure ends the request.
+        if needed is not None and needed.includes(Scope.MOVE) and not is_stop(method, path):
             try:
                 await run_in_threadpool(trail.log.append, actor, f"asked: {action}", address=address)
             except OSError as error:
@@ -186,9 +187,3 @@ class AuditedRequests(HttpMiddleware):
 def is_audited(method: str, path: str) -> bool:
     """Whether a request leaves an entry: not where it only reads, and not for signs of life."""
     return method not in ("GET", "HEAD", "OPTIONS") and not path.endswith("/heartbeat")
-
-
-def _is_asked_first(method: str, path: str) -> bool:
-    """Whether the entry has to be on the disk before the request is looked at; never so for a stop."""
-    scope = find_needed_scope(method, path)
-    return scope is not None and scope.includes(Scope.MOVE) and not is_stop(method, path)

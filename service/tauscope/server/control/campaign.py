@@ -3,7 +3,7 @@
 import logging
 import shutil
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -26,12 +26,7 @@ from tauscope.server.control.run import (
     wait_for_end,
 )
 from tauscope.server.control.run_manager import Manager, RunManager, run_recording_name
-from tauscope.server.queue.analyses import (
-    DiagnosisWorkspace,
-    ExcitationOrder,
-    ExcitationWorkspace,
-    IdentificationWorkspace,
-)
+from tauscope.server.queue import analyses
 from tauscope.server.queue.job_folder import (
     JobProblem,
     JobRecord,
@@ -78,8 +73,8 @@ class CampaignWorkspace(Workspace[CampaignOrder]):
     def read_made(self) -> CampaignLinks:
         return read_stored(self._made, CampaignLinks) or CampaignLinks()
 
-    def write_made(self, made: CampaignLinks) -> None:
-        write_stored(self._made, made)
+    def record_made(self, **made: object) -> None:
+        write_stored(self._made, self.read_made().model_copy(update=made))
 
 
 _log = logging.getLogger("tauscope.jobs")
@@ -90,9 +85,7 @@ RETRY_S = 0.5  # how often a queue, or a disk, that is full is asked again [s]
 @dataclass(frozen=True, eq=False)
 class CampaignDependencies:
     jobs: JobQueue
-    excitations: JobKind
-    identifications: JobKind
-    diagnoses: JobKind
+    kinds: Mapping[str, JobKind]
     runs: RunManager
     recordings: RecordingStore
 
@@ -172,31 +165,31 @@ class CampaignRunner:
             excitation = self._design(order.excitation, "excitation")
             held_out_options = order.held_out_options()
             held_out = held_out_options and self._design(held_out_options, "held_out_excitation")
-            self._wait(self._dependencies.excitations, excitation, "excitation")
+            self._wait("excitation", excitation)
             self._begin("run the motion")
             recordings = (self._run_motion(excitation, "run"),)
             judges: tuple[str, ...] = ()
             if held_out:
                 self._begin("design the held-out motion")
-                self._wait(self._dependencies.excitations, held_out, "excitation")
+                self._wait("excitation", held_out)
                 self._begin("run the held-out motion")
                 judges = (self._run_motion(held_out, "held_out_run"),)
-            self._record(recordings=recordings, held_out=judges)
+            self._workspace.record_made(recordings=recordings, held_out=judges)
         self._release_arm()
         self._begin("identify")
-        kinds = self._dependencies
-        self._analyse("identification", kinds.identifications, IdentificationWorkspace, order.identification)
+        self._analyse("identification", analyses.IdentificationWorkspace, order.identification)
         if order.diagnosis is not None:
             self._begin("diagnose")
-            self._analyse("diagnosis", kinds.diagnoses, DiagnosisWorkspace, order.diagnosis)
+            self._analyse("diagnosis", analyses.DiagnosisWorkspace, order.diagnosis)
 
     def _design(self, options: ExcitationDesignOptions, link: str) -> str:
-        order = ExcitationOrder(**self._robot, options=options)
-        identifier = self._submit(self._dependencies.excitations, ExcitationWorkspace, order)
-        self._record(**{link: identifier})
+        order = analyses.ExcitationOrder(**self._robot, options=options)
+        identifier = self._submit(analyses.ExcitationWorkspace, order)
+        self._workspace.record_made(**{link: identifier})
         return identifier
 
-    def _submit(self, kind: JobKind, workspace: type[TaskWorkspace[Order]], order: Order) -> str:
+    def _submit(self, workspace: type[TaskWorkspace[Order]], order: Order) -> str:
+        kind = self._dependencies.kinds[workspace.noun]
         while True:
             try:
                 return submit_job(self._dependencies.jobs, kind, workspace, order, self._put_robot)
@@ -207,8 +200,8 @@ class CampaignRunner:
     def _put_robot(self, folder: Path) -> None:
         shutil.copytree(self._workspace.robot, folder, dirs_exist_ok=True)
 
-    def _wait(self, kind: JobKind, identifier: str, noun: str) -> None:
-        record = wait_for_end(Workspace(kind.items.folder(identifier)), self._stop_requested)
+    def _wait(self, noun: str, identifier: str) -> None:
+        record = wait_for_end(self._job(noun, identifier), self._stop_requested)
         if record is None:
             raise StoppedError
         require_succeeded(record, f"{noun} {identifier}")
@@ -225,14 +218,15 @@ class CampaignRunner:
         )
         with stage_workspace(dependencies.runs.items, RunWorkspace) as staged:
             self._put_robot(staged.robot)
-            take_trajectory(ExcitationWorkspace(dependencies.excitations.items.folder(excitation)), staged)
+            design = analyses.ExcitationWorkspace(dependencies.kinds["excitation"].items.folder(excitation))
+            take_trajectory(design, staged)
             staged.write_order(request)
             self._run_identifier = dependencies.runs.submit(staged.folder, ready_motion, self.holder, self._permit)
-        self._record(**{link: self._run_identifier})
+        self._workspace.record_made(**{link: self._run_identifier})
         if self._stop_requested.is_set():
             dependencies.runs.stop(self._run_identifier)
         self._follow(self._run_identifier)
-        record = RunWorkspace(dependencies.runs.items.folder(self._run_identifier)).read_run()
+        record = RunWorkspace(dependencies.runs.items.folder(self._run_identifier)).read_record()
         if record is None or record.state is not RunState.FINISHED:
             if self._stop_requested.is_set():
                 raise StoppedError
@@ -248,25 +242,29 @@ class CampaignRunner:
                 self._workspace.write_progress(told, {"run": run, "state": live.state.value})
             threading.Event().wait(POLL_S)
 
-    def _analyse(self, link: str, kind: JobKind, workspace: type[TaskWorkspace[Any]], options: Any) -> None:
+    def _analyse(self, link: str, workspace: type[TaskWorkspace[Any]], options: Any) -> None:
         """Have the recordings analysed; goes on with what was submitted before the service was started again."""
-        identifier = self._find_submitted(kind, getattr(self._workspace.read_made(), link))
+        identifier = self._find_submitted(link)
         if identifier is None:
             order_type: type[Any] = workspace.order_type
             order = order_type(**self._robot, **self._recordings(), options=options)
-            identifier = self._submit(kind, workspace, order)
-        self._record(**{link: identifier})
-        self._wait(kind, identifier, link)
+            identifier = self._submit(workspace, order)
+        self._workspace.record_made(**{link: identifier})
+        self._wait(link, identifier)
 
     def _recordings(self) -> dict[str, Any]:
         made = self._workspace.read_made()
         lists = {"recordings": made.recordings, "held_out": made.held_out}
         return {role: order_kept(self._dependencies.recordings, names) for role, names in lists.items()}
 
-    def _find_submitted(self, kind: JobKind, identifier: str | None) -> str | None:
+    def _job(self, kind: str, identifier: str) -> Workspace[Any]:
+        return Workspace(self._dependencies.kinds[kind].items.folder(identifier))
+
+    def _find_submitted(self, kind: str) -> str | None:
         """The job that this campaign handed in before the service was started again, where that one counts still."""
+        identifier = getattr(self._workspace.read_made(), kind)
         try:
-            record = None if identifier is None else Workspace(kind.items.folder(identifier)).read_record()
+            record = None if identifier is None else self._job(kind, identifier).read_record()
         except NotFoundError:
             return None
         requeue = (JobState.CANCELLED, JobState.INTERRUPTED)
@@ -277,18 +275,15 @@ class CampaignRunner:
             raise StoppedError
         self._workspace.write_step(step)
 
-    def _record(self, **made: object) -> None:
-        self._workspace.write_made(self._workspace.read_made().model_copy(update=made))
-
     def _cancel_jobs(self) -> None:
         made, dependencies = self._workspace.read_made(), self._dependencies
-        jobs = [(dependencies.excitations, made.excitation), (dependencies.excitations, made.held_out_excitation)]
-        jobs += [(dependencies.identifications, made.identification), (dependencies.diagnoses, made.diagnosis)]
+        jobs = [("excitation", made.excitation), ("excitation", made.held_out_excitation)]
+        jobs += [("identification", made.identification), ("diagnosis", made.diagnosis)]
         for kind, identifier in jobs:
             # one that a full disk does not let be cancelled is done for nobody
             with suppress(NotFoundError, OSError):
                 if identifier is not None:
-                    dependencies.jobs.cancel(kind, identifier)
+                    dependencies.jobs.cancel(dependencies.kinds[kind], identifier)
 
     def _move(self, state: JobState, problem: JobProblem | None = None) -> bool:
         record = self._workspace.read_record()

@@ -19,16 +19,8 @@ from tauscope.runtime.options import RunOptions
 from tauscope.runtime.record import RUN_FILE, RunProblem, RunRecord, new_record, read_record, write_record
 from tauscope.runtime.run_process import RunProcess, recover_run
 from tauscope.runtime.states import RunState
+from tauscope.server.queue import job_folder
 from tauscope.server.queue.analyses import ExcitationWorkspace
-from tauscope.server.queue.job_folder import (
-    EndedEvent,
-    JobFolder,
-    JobProblem,
-    JobRecord,
-    JobState,
-    Workspace,
-    without_folders,
-)
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.queue.task_job import TaskWorkspace
 from tauscope.strict_model import StrictModel
@@ -48,7 +40,7 @@ class RunRequestRecord(StrictModel):
     options: RunOptions = Field(default=RunOptions(), description="how it is run")
 
 
-class RunWorkspace(JobFolder[RunRequestRecord]):
+class RunWorkspace(job_folder.JobFolder[RunRequestRecord]):
     """Input, and the folder ``control/`` of the control process; before there is one the record stands beside it."""
 
     order_type = RunRequestRecord
@@ -77,20 +69,16 @@ class RunWorkspace(JobFolder[RunRequestRecord]):
         backend, mode = request.backend.name, request.options.mode.value
         write_record(self.folder, new_record(request.robot_name, backend, mode))
 
-    def read_run(self) -> RunRecord | None:
+    @override
+    def read_record(self) -> RunRecord | None:
         try:
             return read_record(self.control if self._has_begun else self.folder)
         except AcquisitionError:
             return None
 
-    @override
-    def has_ended(self) -> bool:
-        record = self.read_run()
-        return record is None or record.state.is_end
-
     def end_before_start(self, state: RunState, problem: RunProblem | None) -> None:
         """Write the end of a run that no control process was started for. Raises OSError if it cannot be written."""
-        record = self.read_run()
+        record = self.read_record()
         if record is None or record.state.is_end or self._has_begun:
             return
         write_record(self.folder, record.moved(RunState.STOPPING).moved(state, problem=problem))
@@ -103,21 +91,21 @@ class RunWorkspace(JobFolder[RunRequestRecord]):
         detail = "the service ended before this run began; hand it in again"
         self.end_before_start(RunState.INTERRUPTED, RunProblem(code="interrupted", detail=detail))
 
-    def problem(self) -> JobProblem | None:
+    def problem(self) -> job_folder.JobProblem | None:
         """Why the run did not finish, without the server's folders; None where nothing is known against it."""
-        record = self.read_run()
+        record = self.read_record()
         if record is None or record.problem is None:
             return None
-        return JobProblem(code=record.problem.code, detail=self.in_user_terms(record.problem.detail))
+        return job_folder.JobProblem(code=record.problem.code, detail=self.in_user_terms(record.problem.detail))
 
     def in_user_terms(self, text: str) -> str:
-        return without_folders(text, self.control, self.trajectories, self.robot, self.folder)
+        return job_folder.without_folders(text, self.control, self.trajectories, self.robot, self.folder)
 
     def tell_end(self) -> None:
-        record = self.read_run()
+        record = self.read_record()
         if record is not None and record.state.is_end and not self.has_told_end():
             time = record.history[-1].at.astimezone(UTC)
-            self.tell(EndedEvent(time=time, state=record.state, problem=self.problem()))
+            self.tell(job_folder.EndedEvent(time=time, state=record.state, problem=self.problem()))
 
     @property
     def _has_begun(self) -> bool:
@@ -172,7 +160,7 @@ def await_design(jobs: JobQueue, excitations: JobKind, excitation: str) -> Motio
     return fetch
 
 
-def wait_for_end(workspace: Workspace, stop: threading.Event) -> JobRecord | None:
+def wait_for_end(workspace: job_folder.Workspace, stop: threading.Event) -> job_folder.JobRecord | None:
     """The end of a job, None where `stop` came first. Raises AcquisitionError if it was removed or is damaged."""
     while not stop.is_set():
         record = workspace.read_record()
@@ -187,15 +175,15 @@ def wait_for_end(workspace: Workspace, stop: threading.Event) -> JobRecord | Non
 class StepFailedError(AcquisitionError):
     """Something that others wait for has ended without result."""
 
-    def __init__(self, problem: JobProblem) -> None:
+    def __init__(self, problem: job_folder.JobProblem) -> None:
         super().__init__(problem.detail)
         self.problem = problem
 
 
-def require_succeeded(record: JobRecord, name: str) -> None:
+def require_succeeded(record: job_folder.JobRecord, name: str) -> None:
     """Refuse to go on without a result. Raises StepFailedError with the problem that the job ended in."""
-    if record.state is not JobState.SUCCEEDED:
-        problem = record.problem or JobProblem(code="internal", detail="it has no result")
+    if record.state is not job_folder.JobState.SUCCEEDED:
+        problem = record.problem or job_folder.JobProblem(code="internal", detail="it has no result")
         raise StepFailedError(problem.model_copy(update={"detail": f"{name}: {problem.detail}"}))
 
 

@@ -175,8 +175,7 @@ class RunSupervisor:
         self._permit.disarm()
         self._halt()
 
-    def interrupt(self) -> None:
-        self.stop()
+    interrupt = stop
 
     def _halt(self) -> None:
         self._stop_requested.set()
@@ -290,7 +289,13 @@ class RunManager(Manager[RunSupervisor]):
             identifier = self._publish(staged, self.claims, claim, permit)
             workspace = RunWorkspace(self.items.folder(identifier))
             supervisor = RunSupervisor(workspace, self._start, motion, self._is_alive, permit)
-            self._supervise(identifier, supervisor, lambda: self._end_supervised(workspace, claim))
+
+            def end() -> None:
+                self._end(workspace, claim)
+                if (record := workspace.read_record()) is not None:
+                    self._on_end(record)
+
+            self._supervise(identifier, supervisor, end)
         return identifier
 
     def live(self, identifier: str) -> Live | None:
@@ -304,12 +309,6 @@ class RunManager(Manager[RunSupervisor]):
         """Keep recordings that a full disk did not take. Raises OSError if it still does not."""
         for workspace in list(self._pending.values()):
             self._conclude(workspace)
-
-    def _end_supervised(self, workspace: RunWorkspace, claim: tuple[str, str] | None) -> None:
-        self._end(workspace, claim)
-        record = workspace.read_run()
-        if record is not None:
-            self._on_end(record)
 
     def _end(self, workspace: RunWorkspace, claim: tuple[str, str] | None) -> None:
         try:
@@ -328,18 +327,15 @@ class RunManager(Manager[RunSupervisor]):
             self._pending.pop(identifier, None)
             return
         self._pending[identifier] = workspace
+        path, record = workspace.recording("csv"), workspace.read_record()
         try:
-            self._keep_recording(workspace)
+            if record is not None and record.state.is_end and path.is_file():
+                name = run_recording_name(identifier)
+                self._recordings.keep(KeptFile(path, name, path.stat().st_size, hash_file(path)))
         except TauscopeError:
             _log.exception("the recording of run %s could not be kept", identifier)
         workspace.tell_end()
         self._pending.pop(identifier, None)
-
-    def _keep_recording(self, workspace: RunWorkspace) -> None:
-        path, record = workspace.recording("csv"), workspace.read_run()
-        if record is not None and record.state.is_end and path.is_file():
-            name = run_recording_name(workspace.folder.name)
-            self._recordings.keep(KeptFile(path, name, path.stat().st_size, hash_file(path)))
 
 
 def run_recording_name(identifier: str) -> str:

@@ -78,7 +78,12 @@ class Drift:
 
 def compute_drift(before: Sequence[NamedParameter], after: Sequence[NamedParameter]) -> tuple[Drift, ...]:
     later = {parameter.name: parameter for parameter in after}
-    return tuple(_drift(parameter, later[parameter.name]) for parameter in before if parameter.name in later)
+    drifts = []
+    for old in before:
+        if (new := later.get(old.name)) is not None:
+            change, std = new.value - old.value, math.hypot(old.std, new.std)
+            drifts.append(Drift(old.name, old.joint, old.value, new.value, std, change / std, change / old.scale))
+    return tuple(drifts)
 
 
 def find_largest_by_joint(drifts: Sequence[Drift]) -> Mapping[str, Drift]:
@@ -91,11 +96,6 @@ def find_largest_by_joint(drifts: Sequence[Drift]) -> Mapping[str, Drift]:
 
 def is_beyond(drift: Drift, policy: ModelPolicy) -> bool:
     return abs(drift.in_std) > policy.drift_std and abs(drift.share) > policy.drift_share
-
-
-def _drift(before: NamedParameter, after: NamedParameter) -> Drift:
-    difference, std = after.value - before.value, math.hypot(before.std, after.std)
-    return Drift(before.name, before.joint, before.value, after.value, std, difference / std, difference / before.scale)
 
 
 _NOUNS = {

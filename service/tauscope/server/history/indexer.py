@@ -13,27 +13,15 @@ from typing import Any
 from tauscope.errors import NotFoundError
 from tauscope.server.control.campaign import CampaignWorkspace
 from tauscope.server.control.run import RunWorkspace
-from tauscope.server.queue.analyses import (
-    DiagnosisWorkspace,
-    ExcitationWorkspace,
-    IdentificationWorkspace,
-    RolloutWorkspace,
-)
+from tauscope.server.queue.analyses import TASKS
 from tauscope.server.queue.job_folder import JobState
 from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.database.index import FileMetadata, Index, ItemMetadata, RecordingRole
 from tauscope.server.store.files import hash_file, identifier_time
 from tauscope.server.store.recordings import RecordingStore
 
-WORKSPACES: Mapping[str, type[Any]] = {
-    "excitation": ExcitationWorkspace,
-    "identification": IdentificationWorkspace,
-    "diagnosis": DiagnosisWorkspace,
-    "rollout": RolloutWorkspace,
-    "campaign": CampaignWorkspace,
-}
+WORKSPACES: Mapping[str, type[Any]] = {**TASKS, "campaign": CampaignWorkspace}
 """The folder of each kind of item that has a job's record; a run has a record of its own."""
-_ANALYSES = (IdentificationWorkspace, DiagnosisWorkspace, RolloutWorkspace)
 DAMAGED = "damaged"
 _ROLES = ("recordings", "held_out", "simulated", "refine")
 _LIVING = {"state.json", "events.jsonl", "progress", "cancel", "run.json", "stop", "control.log"}
@@ -100,7 +88,7 @@ def _read_job(kind: str, folder: Path) -> ItemMetadata:
         problem=None if record.problem is None else (record.problem.code, record.problem.detail),
         recordings=tuple(_roles(order)),
     )
-    if record.state is not JobState.SUCCEEDED or not isinstance(workspace, _ANALYSES):
+    if record.state is not JobState.SUCCEEDED or kind in ("campaign", "excitation"):
         return facts
     content = workspace.read_result()
     if content is None:
@@ -139,7 +127,7 @@ def _describe_damage(kind: str, folder: Path, mark: str, file: str) -> ItemMetad
 
 def _read_run(folder: Path) -> ItemMetadata:
     workspace, mark = RunWorkspace(folder), stamp("run", folder)
-    request, record = workspace.read_order(), workspace.read_run()
+    request, record = workspace.read_order(), workspace.read_record()
     if request is None or record is None:
         return _describe_damage("run", folder, mark, "request.json" if request is None else "run.json")
     problem = workspace.problem()
@@ -189,7 +177,10 @@ class Indexer:
                 self._known = {kind: self.index.stamps(kind) for kind in self._items}
             for kind, store in self._items.items():
                 self._sync_kind(kind, store, thorough=thorough)
-            self._sync_recordings()
+            recordings = self._recordings.entries()
+            if recordings != self._seen_recordings:
+                self.index.put_recordings(recordings)
+                self._seen_recordings = recordings
             self._is_whole = not self._is_closing.is_set()
 
     def close(self) -> None:
@@ -272,12 +263,6 @@ class Indexer:
         """Index items in one transaction: to wait for the disk once each would take hours for a large folder."""
         self.index.put(found)
         self._known[kind] |= {facts.identifier: (facts.stamp, facts.is_final) for facts in found}
-
-    def _sync_recordings(self) -> None:
-        entries = self._recordings.entries()
-        if entries != self._seen_recordings:
-            self.index.put_recordings(entries)
-            self._seen_recordings = entries
 
 
 def open_index(index: Index, items: Mapping[str, ItemStore], recordings: RecordingStore, label: str) -> Indexer:

@@ -1,5 +1,8 @@
 """Identifications, diagnoses and rollouts: requests, answers and what is special about these resources."""
 
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 from pydantic import Field
@@ -7,38 +10,29 @@ from pydantic import Field
 from tauscope.closed_loop import RolloutDocument
 from tauscope.diagnosis import DiagnosisDocument
 from tauscope.diagnosis.documents.plots import DiagnosisPlots
-from tauscope.diagnosis.extended_model import LARGEST_FILE
-from tauscope.errors import NotFoundError
+from tauscope.errors import IdentificationError, NotFoundError
 from tauscope.export.model_file import ModelFile
 from tauscope.identification import IdentificationDocument
 from tauscope.report.curves import IdentificationPlots
 from tauscope.server.http.answers import JobAnswer, JobLinks, require_document
+from tauscope.server.http.bodies import to_json_text
 from tauscope.server.http.openapi import binary_part, binary_parts
 from tauscope.server.http.services import Services
-from tauscope.server.http.tasks.queued import QueuedTask
-from tauscope.server.http.tasks.router import (
-    JobDocument,
-    plots_document,
-    report_document,
-    result_document,
-    text_document,
-)
-from tauscope.server.http.tasks.submission import (
-    EXAMPLE_ROBOT,
-    MODEL_FILE,
-    RECORDINGS_EXAMPLE,
-    Names,
-    Received,
-    RecordingsRequest,
-    keep_model,
-)
+from tauscope.server.http.tasks import queued
+from tauscope.server.http.tasks.queued import JobDocument, QueuedTask
+from tauscope.server.http.tasks.submission import EXAMPLE_ROBOT, MODEL_FILE, Names, RecordingsRequest, Submission
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.analyses import DiagnosisWorkspace, IdentificationWorkspace, RolloutWorkspace
-from tauscope.server.queue.task_job import SAVED_MODEL, TRAJECTORY, OrderedRecording
+from tauscope.server.queue.task_job import SAVED_MODEL, TRAJECTORY, OrderedRecording, TaskWorkspace
 from tauscope.tasks.diagnose import DiagnosisOptions
 from tauscope.tasks.identify import IdentificationOptions
 from tauscope.tasks.task import ReadingOptions
 from tauscope.trajectory.document import TrajectoryDocument
+
+RECORDINGS_EXAMPLE: tuple[str, Any] = (
+    "Recordings that lie on the server",
+    {"robot": EXAMPLE_ROBOT, "recordings": ["monday.csv", "tuesday.csv"], "held_out": ["wednesday.mcap"]},
+)
 
 
 class IdentificationRequest(RecordingsRequest):
@@ -84,7 +78,6 @@ class IdentificationAnswer(JobAnswer):
 IDENTIFICATIONS = QueuedTask(
     noun="an identification",
     plural="identifications",
-    kind=lambda services: services.identifications,
     workspace=IdentificationWorkspace,
     models=(IdentificationRequest, IdentificationAnswer),
     examples=IDENTIFICATION_EXAMPLES,
@@ -96,8 +89,8 @@ IDENTIFICATIONS = QueuedTask(
     },
     work_problems=("robot-file", "recording", "recording-mismatch", "identification", "invalid-request"),
     documents=(
-        result_document("an identification", "identify", IdentificationDocument),
-        plots_document("the identification", IdentificationPlots, "torque over time, friction over velocity"),
+        queued.result_document("an identification", "identify", IdentificationDocument),
+        queued.plots_document("the identification", IdentificationPlots, "torque over time, friction over velocity"),
         JobDocument(
             "model",
             MODEL_FILE,
@@ -106,7 +99,7 @@ IDENTIFICATIONS = QueuedTask(
             {"model": ModelFile, "description": "the same document as `tauscope identify --model`"},
             missing="an earlier version identified this and kept no model; hand it in again",
         ),
-        report_document("identify"),
+        queued.report_document("identify"),
     ),
     export_words="The identified model for a controller (json, yaml, c, python) or a simulator (urdf, mjcf).",
 )
@@ -175,29 +168,37 @@ class DiagnosisAnswer(JobAnswer):
 YAML = "text/yaml"  # an alias of application/yaml (RFC 9512), which generators of clients do not read
 
 
-def place_earlier_model(
-    received: Received[DiagnosisRequest], services: Services, workspace: Any
-) -> dict[str, str | None]:
+def keep_model(handed: Submission[Any], find: Callable[[Services, str], TaskWorkspace[Any]]) -> str | None:
+    """Put a model, or that of an identifier, into its place; its name. Raises ProblemError, IdentificationError."""
+    model, file = handed.document.model, handed.form.file("model")
+    if file is not None and model is not None:
+        raise ProblemError("invalid-request", "the model came twice, as part model and in part request; send it once")
+    if file is not None or model is None:
+        return None if file is None else file.name
+    path: Path = handed.workspace.uploads(SAVED_MODEL) / MODEL_FILE
+    if isinstance(model, str):
+        path.write_bytes(require_document(find(handed.services, model).read_output(MODEL_FILE), model))
+    else:
+        path.write_text(to_json_text(model, "model", IdentificationError), encoding="utf-8")
+    return MODEL_FILE
+
+
+def keep_earlier_model(handed: Submission[DiagnosisRequest]) -> str | None:
     """Put the model into its place. Raises ProblemError if it came twice or is not `against`, or NotFoundError."""
-    document, file = received.document, received.form.file("model")
-    against, has_simulated = document.options.against, bool(received.form.files.get("simulated") or document.simulated)
+    document, form = handed.document, handed.form
+    against, has_simulated = document.options.against, bool(form.files.get("simulated") or document.simulated)
     if (against == "simulation") != has_simulated:
         text = "options.against: simulation and recordings of a simulator belong together; send both or neither"
         raise ProblemError("invalid-request", text)
-    if (against == "saved") != (file is not None or document.model is not None):
+    if (against == "saved") != (form.file("model") is not None or document.model is not None):
         text = "options.against: saved and a model belong together; send both or neither"
         raise ProblemError("invalid-request", text)
-
-    def read(identifier: str) -> bytes:
-        return require_document(DIAGNOSES.finished(services, identifier).read_output(MODEL_FILE), identifier)
-
-    return {"model": keep_model(document.model, file, workspace, read)}
+    return keep_model(handed, DIAGNOSES.finished)
 
 
 DIAGNOSES = QueuedTask(
     noun="a diagnosis",
     plural="diagnoses",
-    kind=lambda services: services.diagnoses,
     workspace=DiagnosisWorkspace,
     models=(DiagnosisRequest, DiagnosisAnswer),
     examples=DIAGNOSIS_EXAMPLES,
@@ -209,13 +210,12 @@ DIAGNOSES = QueuedTask(
         "simulated": binary_parts("recordings made in your own simulator"),
         "model": binary_part("a model that an earlier diagnosis saved, to compare with"),
     },
-    further=place_earlier_model,
-    further_parts={"model": (SAVED_MODEL, LARGEST_FILE)},
+    put_model=keep_earlier_model,
     work_problems=("robot-file", "recording", "recording-mismatch", "identification", "excitation", "invalid-request"),
     documents=(
-        result_document("a diagnosis", "diagnose", DiagnosisDocument),
-        plots_document("the diagnosis", DiagnosisPlots, "residuals over time and by variable, before and after"),
-        report_document("diagnose"),
+        queued.result_document("a diagnosis", "diagnose", DiagnosisDocument),
+        queued.plots_document("the diagnosis", DiagnosisPlots, "residuals over time and by variable, before and after"),
+        queued.report_document("diagnose"),
         JobDocument(
             "model",
             MODEL_FILE,
@@ -223,7 +223,7 @@ DIAGNOSES = QueuedTask(
             "The extended model.",
             {"model": ModelFile, "description": "the same document as `tauscope diagnose --model`"},
         ),
-        text_document(
+        queued.text_document(
             "scenario",
             "scenario.yaml",
             YAML,
@@ -231,7 +231,7 @@ DIAGNOSES = QueuedTask(
             "A scenario that the simulated arm plays with the improved robot.",
             "file as `tauscope diagnose --scenario`",
         ),
-        text_document(
+        queued.text_document(
             "improved-robot",
             "improved-robot.yaml",
             YAML,
@@ -292,23 +292,17 @@ class RolloutAnswer(JobAnswer):
     links: RolloutLinksAnswer = Field(description="where to go on")
 
 
-def place_rolled_model(received: Received[RolloutRequest], services: Services, workspace: Any) -> dict[str, str | None]:
-    """Put the model into its place. Raises ProblemError if it came twice, NotFoundError if it is unknown."""
-
-    def read(identifier: str) -> bytes:
-        try:
-            found = IDENTIFICATIONS.finished(services, identifier)
-        except NotFoundError:
-            found = DIAGNOSES.finished(services, identifier)
-        return require_document(found.read_output(MODEL_FILE), identifier)
-
-    return {"model": keep_model(received.document.model, received.form.file("model"), workspace, read)}
+def find_model(services: Services, identifier: str) -> TaskWorkspace[Any]:
+    """The identification or diagnosis that made a model. Raises NotFoundError, or ProblemError without success."""
+    try:
+        return IDENTIFICATIONS.finished(services, identifier)
+    except NotFoundError:
+        return DIAGNOSES.finished(services, identifier)
 
 
 ROLLOUTS = QueuedTask(
     noun="a rollout",
     plural="rollouts",
-    kind=lambda services: services.rollouts,
     workspace=RolloutWorkspace,
     models=(RolloutRequest, RolloutAnswer),
     examples=ROLLOUT_EXAMPLES,
@@ -320,10 +314,9 @@ ROLLOUTS = QueuedTask(
         "refine": binary_parts("recordings with commands by which the model is refined"),
         "model": binary_part("a model that identify or diagnose saved"),
     },
-    further=place_rolled_model,
-    further_parts={"model": (SAVED_MODEL, LARGEST_FILE)},
+    put_model=partial(keep_model, find=find_model),
     work_problems=("robot-file", "recording", "recording-mismatch", "identification", "export", "invalid-request"),
-    documents=(result_document("a rollout", "rollout", RolloutDocument), report_document("rollout")),
+    documents=(queued.result_document("a rollout", "rollout", RolloutDocument), queued.report_document("rollout")),
 )
 
 routers = tuple(task.router() for task in (IDENTIFICATIONS, DIAGNOSES, ROLLOUTS))

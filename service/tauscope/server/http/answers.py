@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
-from fastapi import Path, Query, Request
+from fastapi import Path, Query
 from pydantic import ConfigDict, Field
 
 from tauscope.server.problems import Problem, ProblemError, make_problem
@@ -27,6 +27,8 @@ class PageAnswer(AnswerModel):
     next: str | None = Field(default=None, description="to be given as `after` for the next page; null: it is the last")
 
 
+ROOT = "/api/v1"
+"""Path of the interface."""
 Identifier = Annotated[str, Path(description="identifier", examples=["20261103T101502Z-1f2e3d4c"])]
 Limit = Annotated[int, Query(ge=1, le=1000, description="most entries of the list")]
 After = Annotated[str | None, Query(max_length=255, description="`next` of the page before; null: the first page")]
@@ -36,11 +38,6 @@ SUBMISSION = ("bad-request", "limit-exceeded", "media-type", "robot-file", "inva
 """Problems of handing anything in that comes with a robot file."""
 MOTION = ("busy", "leased", "lease-needed", "lease-lost", "not-armed")
 """Problems of moving an arm that somebody else has, or that the lease does not let move."""
-
-
-def collection(request: Request, steps_below: int) -> str:
-    """Path of the collection, seen from a request below it."""
-    return request.url.path.rsplit("/", steps_below)[0]
 
 
 class Links(AnswerModel):

@@ -33,6 +33,7 @@ from tauscope.server.http import (
     runs,
     schedules,
 )
+from tauscope.server.http.answers import ROOT
 from tauscope.server.http.openapi import install_openapi
 from tauscope.server.http.problem_handlers import collect_methods, install_problem_handlers, require_known_query
 from tauscope.server.http.protection import BodyLimit, ConcurrencyLimiter, OriginCheck, RequestLog, ResponseProtection
@@ -44,14 +45,13 @@ from tauscope.server.page.router import router as page
 
 API_VERSION = "1.23.0"
 """Of the interface, not of the package; a change of tests/server/http/openapi.json goes with a change here."""
-PREFIX = "/api/v1"
 VERBS = (
     *(module.router for module in (campaigns, excitations, runs, recordings)),
     *analyses.routers,
     *(module.router for module in (robots, items, history, schedules, leases)),
     *(recordings.mapping_router, leases.stop_router),
 )
-"""Routers of everything that a client may ask for, below `PREFIX`."""
+"""Routers of everything that a client may ask for, below `ROOT`."""
 PAGES = (health.router, pages.router, page)
 
 
@@ -79,10 +79,10 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
         redoc_url=None,
     )
     for router in VERBS:
-        app.include_router(router, prefix=PREFIX, dependencies=[Depends(require_known_query)])
+        app.include_router(router, prefix=ROOT, dependencies=[Depends(require_known_query)])
     for router in PAGES:
         app.include_router(router)
-    app.state.methods = collect_methods([*((PREFIX, router) for router in VERBS), *(("", router) for router in PAGES)])
+    app.state.methods = collect_methods([*((ROOT, router) for router in VERBS), *(("", router) for router in PAGES)])
     install_problem_handlers(app)
     install_openapi(app)
     # The last one added is the first to see a request.

@@ -152,7 +152,6 @@ class _Receiver:
 
     def callbacks(self) -> "MultipartCallbacks":
         return {
-            "on_part_begin": self._part_begin,
             "on_header_field": self._header_field,
             "on_header_value": self._header_value,
             "on_header_end": self._header_end,
@@ -168,9 +167,6 @@ class _Receiver:
         for file in (file for files in self.form.files.values() for file in files):
             file.path.unlink(missing_ok=True)
 
-    def _part_begin(self) -> None:
-        self._headers = {}
-
     def _header_field(self, data: bytes, start: int, end: int) -> None:
         self._header[0] += data[start:end]
 
@@ -183,7 +179,8 @@ class _Receiver:
 
     def _headers_finished(self) -> None:
         """A part begins: look its rule up, and open its file."""
-        _, options = parse_options_header(self._headers.get(b"content-disposition"))
+        headers, self._headers = self._headers, {}
+        _, options = parse_options_header(headers.get(b"content-disposition"))
         self._part = options.get(b"name", b"").decode("utf-8", "replace")
         rule = self._rules.get(self._part)
         if rule is None:

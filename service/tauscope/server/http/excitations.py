@@ -12,8 +12,7 @@ from tauscope.server.http.answers import ENDINGS, Identifier, JobAnswer, JobLink
 from tauscope.server.http.openapi import file_responses
 from tauscope.server.http.reading import READING
 from tauscope.server.http.services import ServicesDep
-from tauscope.server.http.tasks.queued import QueuedTask
-from tauscope.server.http.tasks.router import JobDocument
+from tauscope.server.http.tasks.queued import JobDocument, QueuedTask
 from tauscope.server.http.tasks.submission import EXAMPLE_ROBOT, RobotRequest
 from tauscope.server.queue.analyses import ExcitationWorkspace, write_trajectory_piece
 from tauscope.server.queue.job_folder import read_bytes
@@ -55,7 +54,6 @@ Rate = Annotated[float, Query(gt=0.0, le=10_000.0, description="samples a second
 EXCITATIONS = QueuedTask(
     noun="an excitation",
     plural="excitations",
-    kind=lambda services: services.excitations,
     workspace=ExcitationWorkspace,
     models=(ExcitationRequest, ExcitationAnswer),
     examples=EXAMPLES,

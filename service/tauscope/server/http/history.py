@@ -1,12 +1,11 @@
 """Models over HTTP: their history, gates, trends, policies and events."""
 
 from collections.abc import Mapping
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi import APIRouter, Path, Query, Response
 from pydantic import Field
-from starlette.concurrency import run_in_threadpool
 
 from tauscope.errors import NotFoundError
 from tauscope.identification import IdentificationDocument
@@ -14,11 +13,11 @@ from tauscope.server.history.drift import Drift, ParameterTrend, find_largest_by
 from tauscope.server.history.gates import Gate, ModelPolicy
 from tauscope.server.history.model_history import ModelEntry, ModelEventEntry
 from tauscope.server.history.model_judgement import compare_models
-from tauscope.server.http.answers import AnswerModel, Identifier, Limit, collection
-from tauscope.server.http.bodies import read_document
-from tauscope.server.http.openapi import json_request
-from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.answers import ROOT, AnswerModel, Identifier, Limit
+from tauscope.server.http.openapi import takes_document
+from tauscope.server.http.services import ServicesDep, document_of
 from tauscope.server.problems import problem_responses
+from tauscope.server.store.data_folder import utc_now
 from tauscope.strict_model import StrictModel
 
 
@@ -68,8 +67,8 @@ class EventListAnswer(AnswerModel):
     events: list[ModelEventEntry] = Field(description="the newest first")
 
 
-def make_model_answer(entry: ModelEntry, collection: str) -> ModelAnswer:
-    here = f"{collection}/{entry.identifier}"
+def make_model_answer(entry: ModelEntry) -> ModelAnswer:
+    here = f"{ROOT}/models/{entry.identifier}"
     links = ModelLinksAnswer(self=here, document=f"{here}/document")
     return ModelAnswer.describe(entry, id=entry.identifier, links=links)
 
@@ -78,24 +77,25 @@ router = APIRouter(tags=["models"], responses=problem_responses("store"))
 RobotName = Annotated[str, Query(alias="robot", min_length=1, max_length=1000, description="name of the robot")]
 AnyRobot = Annotated[str | None, Query(alias="robot", max_length=1000, description="name of the robot; default: any")]
 Number = Annotated[int, Path(ge=1, le=2**31 - 1, description="number of the event")]
-_REASON = {"why": ("Why", {"reason": "gear oil changed on 3 November"})}
-_BODY_PROBLEMS = problem_responses("bad-request", "limit-exceeded", "media-type", "not-found")
-_WITH_REASON: Any = {"responses": _BODY_PROBLEMS, "openapi_extra": json_request(ReasonRequest, _REASON)}
+Reason = Annotated[ReasonRequest, document_of(ReasonRequest)]
+_WHY = {"why": ("Why", {"reason": "gear oil changed on 3 November"})}
+_WITH_REASON: Any = takes_document(ReasonRequest, _WHY, "not-found")
+_DRIFT = {"drift": ("Tell smaller changes", {"drift_share": 0.1, "drift_std": 5})}
 
 
 @router.get("/models", summary="List models")
-def list_models(request: Request, services: ServicesDep, robot: AnyRobot = None, limit: Limit = 100) -> ModelListAnswer:
+def list_models(services: ServicesDep, robot: AnyRobot = None, limit: Limit = 100) -> ModelListAnswer:
     """Every identification that was judged: the active one of each robot, those that were, those that were refused."""
-    _bring_up_to_date(services)
+    services.judge_new()
     entries = services.models.history.models(robot, limit)
-    return ModelListAnswer(models=[make_model_answer(entry, request.url.path) for entry in entries])
+    return ModelListAnswer(models=[make_model_answer(entry) for entry in entries])
 
 
 @router.get("/models/{identifier}", summary="Look a model up", responses=problem_responses("not-found"))
-def get_model(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
+def get_model(identifier: Identifier, services: ServicesDep) -> ModelAnswer:
     """Its state and the gates that it had to pass; the identifier is the identification's."""
-    _bring_up_to_date(services)
-    return make_model_answer(services.models.history.find(identifier), collection(request, 1))
+    services.judge_new()
+    return make_model_answer(services.models.history.find(identifier))
 
 
 @router.get(
@@ -130,21 +130,21 @@ def get_model_drift(
 
 
 @router.post("/models/{identifier}/activate", summary="Make a model the active one", **_WITH_REASON)
-async def activate_model(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
+def activate_model(body: Reason, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
     """Also one that was refused; the one before is kept. The reason is kept with the choice."""
-    return await _choose(request, identifier, services, "active")
+    return make_model_answer(services.models.history.activate(identifier, "active", body.reason, utc_now()))
 
 
 @router.post("/models/{identifier}/make-reference", summary="Count drift from a model", **_WITH_REASON)
-async def make_reference(request: Request, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
+def make_reference(body: Reason, identifier: Identifier, services: ServicesDep) -> ModelAnswer:
     """After maintenance, say; drifts that are open are closed."""
-    return await _choose(request, identifier, services, "reference")
+    return make_model_answer(services.models.history.activate(identifier, "reference", body.reason, utc_now()))
 
 
 @router.get("/trend", summary="Follow the parameters of a robot", responses=problem_responses("not-found"))
 def get_trend(services: ServicesDep, robot: RobotName) -> TrendAnswer:
     """Every parameter in every model that was ever active, and the straight line through it."""
-    _bring_up_to_date(services)
+    services.judge_new()
     return TrendAnswer(robot=robot, parameters=parameter_trends(services.models.history.documents(robot)))
 
 
@@ -154,16 +154,12 @@ def get_policy(services: ServicesDep, robot: RobotName) -> ModelPolicy:
     return services.models.history.policy(robot)
 
 
-@router.put(
-    "/model-policy",
-    summary="Set the bounds of a robot",
-    responses=_BODY_PROBLEMS,
-    openapi_extra=json_request(ModelPolicy, {"drift": ("Tell smaller changes", {"drift_share": 0.1, "drift_std": 5})}),
-)
-async def set_policy(request: Request, services: ServicesDep, robot: RobotName) -> ModelPolicy:
+@router.put("/model-policy", summary="Set the bounds of a robot", **takes_document(ModelPolicy, _DRIFT, "not-found"))
+def set_policy(
+    policy: Annotated[ModelPolicy, document_of(ModelPolicy)], services: ServicesDep, robot: RobotName
+) -> ModelPolicy:
     """They hold for models that are judged from now on; what is left out takes its default."""
-    policy = await read_document(request, ModelPolicy, services.settings.max_document_bytes)
-    await run_in_threadpool(services.models.history.set_policy, robot, policy)
+    services.models.history.set_policy(robot, policy)
     return policy
 
 
@@ -175,25 +171,11 @@ def list_events(
     limit: Limit = 100,
 ) -> EventListAnswer:
     """Parameters that have drifted beyond the bounds; one event for each, brought up to date while it is open."""
-    _bring_up_to_date(services)
+    services.judge_new()
     return EventListAnswer(events=services.models.history.events(robot, only_open=only_open, limit=limit))
 
 
 @router.post("/events/{number}/acknowledge", summary="Take note of an event", **_WITH_REASON)
-async def acknowledge_event(request: Request, number: Number, services: ServicesDep) -> ModelEventEntry:
+def acknowledge_event(body: Reason, number: Number, services: ServicesDep) -> ModelEventEntry:
     """It is closed; another one is raised when the parameter is found beyond its bounds again."""
-    body = await read_document(request, ReasonRequest, services.settings.max_document_bytes)
-    history, now = services.models.history, datetime.now(UTC)
-    return await run_in_threadpool(history.acknowledge, number, body.reason, now)
-
-
-async def _choose(request: Request, identifier: str, services: Services, role: str) -> ModelAnswer:
-    body = await read_document(request, ReasonRequest, services.settings.max_document_bytes)
-    history, now = services.models.history, datetime.now(UTC)
-    entry = await run_in_threadpool(history.activate, identifier, role, body.reason, now)
-    return make_model_answer(entry, collection(request, 2))
-
-
-def _bring_up_to_date(services: Services) -> None:
-    services.index.refresh()
-    services.models.judge_new()
+    return services.models.history.acknowledge(number, body.reason, utc_now())

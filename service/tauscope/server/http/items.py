@@ -6,7 +6,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 from pydantic import AwareDatetime, Field
 
-from tauscope.server.http.answers import AnswerModel, Limit
+from tauscope.server.http.answers import ROOT, AnswerModel, Limit
 from tauscope.server.http.services import ServicesDep
 from tauscope.server.http.tasks.submission import RobotVersionAnswer
 from tauscope.server.problems import problem_responses
@@ -83,5 +83,5 @@ def list_robots(services: ServicesDep) -> RobotListAnswer:
 
 def _answer(entry: ItemEntry, site: str) -> ItemAnswer:
     is_here = entry.site == site
-    link = f"/api/v1/{FOLDERS[entry.kind]}/{entry.identifier}" if is_here else None
+    link = f"{ROOT}/{FOLDERS[entry.kind]}/{entry.identifier}" if is_here else None
     return ItemAnswer.describe(entry, id=entry.identifier, is_here=is_here, link=link, problem=entry.problem_detail)

@@ -3,7 +3,7 @@
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Path, Request, Response
+from fastapi import APIRouter, Depends, Header, Path, Request, Response
 from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
@@ -13,10 +13,9 @@ from tauscope.runtime.drivers import BackendName
 from tauscope.server.auth.gate import find_caller
 from tauscope.server.auth.keys import Scope
 from tauscope.server.control.leases import LONGEST_TTL_S, Lease, LeaseLostError, Permit
-from tauscope.server.http.answers import AnswerModel
-from tauscope.server.http.bodies import read_document
-from tauscope.server.http.openapi import json_request
-from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.answers import ROOT, AnswerModel
+from tauscope.server.http.openapi import takes_document
+from tauscope.server.http.services import Services, ServicesDep, document_of
 from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.run import BackendChoice
@@ -100,16 +99,19 @@ NO_BODY = {"requestBody": {"required": False, "content": {}}}
     status_code=201,
     summary="Take the lease of an arm",
     response_model=LeaseAnswer,
-    responses=problem_responses("bad-request", "limit-exceeded", "media-type", "leased", "busy"),
-    openapi_extra=json_request(LeaseRequest, EXAMPLES),
+    **takes_document(LeaseRequest, EXAMPLES, "leased", "busy"),
 )
-async def take_lease(request: Request, response: Response, services: ServicesDep) -> LeaseAnswer:
+async def take_lease(
+    wanted: Annotated[LeaseRequest, document_of(LeaseRequest)],
+    request: Request,
+    response: Response,
+    services: ServicesDep,
+) -> LeaseAnswer:
     """Exclusive: nobody else moves the arm while the lease holds. It ends by itself unless heartbeats renew it.
 
     Whatever moves by a lease stops when the lease ends. A service without API keys moves an arm without a lease too, as
     long as nobody has one; with keys, motion needs a lease that is armed.
     """
-    wanted = await read_document(request, LeaseRequest, services.settings.max_document_bytes)
     caller = find_caller(request.scope)
     if wanted.take and not caller.scope.includes(Scope.ADMIN):
         raise ProblemError("forbidden", f"taking an arm needs a key of scope admin; the one of {caller.name} has less")
@@ -118,53 +120,61 @@ async def take_lease(request: Request, response: Response, services: ServicesDep
     lease = await run_in_threadpool(
         services.leases.acquire, device, holder, find_owner(request), wanted.ttl_s, take=wanted.take
     )
-    answer = _answer(services, lease, request.url.path, token=lease.token)
+    answer = _answer(services, lease, token=lease.token)
     response.headers["Location"] = answer.links.self_
     return answer
 
 
 @router.get("", summary="List leases")
-async def list_leases(request: Request, services: ServicesDep) -> LeaseListAnswer:
+async def list_leases(services: ServicesDep) -> LeaseListAnswer:
     """Those that hold, without their tokens."""
-    return LeaseListAnswer(leases=[_answer(services, lease, request.url.path) for lease in services.leases.active()])
+    return LeaseListAnswer(leases=[_answer(services, lease) for lease in services.leases.active()])
 
 
 @router.get("/{identifier}", summary="Look a lease up", responses=problem_responses("not-found"))
-async def get_lease(request: Request, identifier: Identifier, services: ServicesDep) -> LeaseAnswer:
+async def get_lease(identifier: Identifier, services: ServicesDep) -> LeaseAnswer:
     """Who has which arm, and for how long."""
     lease = services.leases.find(identifier)
     if lease is None:
         raise NotFoundError(f"no lease {shown(identifier)} holds; list the leases")
-    return _answer(services, lease, request.url.path.rsplit("/", 1)[0])
+    return _answer(services, lease)
+
+
+async def _find_held(
+    request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken
+) -> tuple[str, str, str]:
+    """The arm of a lease, the token that came with the request, and who sent it. Raises LeaseLostError."""
+    lease = services.leases.find(identifier)
+    if lease is None:
+        raise LeaseLostError(f"{shown(identifier)}: this lease does not hold (any more); take a new one")
+    return lease.device, token or "", find_owner(request)
+
+
+Held = Annotated[tuple[str, str, str], Depends(_find_held)]
 
 
 @router.post("/{identifier}/heartbeat", summary="Keep a lease", responses=_HELD, openapi_extra=NO_BODY)
-async def keep_lease(request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken) -> LeaseAnswer:
+async def keep_lease(held: Held, services: ServicesDep) -> LeaseAnswer:
     """A sign of life: the lease lasts for its whole time again. One that has ended is not brought back."""
-    lease = services.leases.renew(_device(services, identifier), token or "", find_owner(request))
-    return _answer(services, lease, request.url.path.rsplit("/", 2)[0])
+    return _answer(services, services.leases.renew(*held))
 
 
 @router.post("/{identifier}/arm", summary="Arm a lease", responses=_HELD, openapi_extra=NO_BODY)
-async def arm_lease(request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken) -> LeaseAnswer:
+async def arm_lease(held: Held, services: ServicesDep) -> LeaseAnswer:
     """From now on the arm moves when a run or a campaign is handed in with the lease. Every stop disarms."""
-    lease = services.leases.arm(_device(services, identifier), token or "", find_owner(request), armed=True)
-    return _answer(services, lease, request.url.path.rsplit("/", 2)[0])
+    return _answer(services, services.leases.arm(*held, armed=True))
 
 
 @router.post("/{identifier}/disarm", summary="Disarm a lease", responses=_HELD, openapi_extra=NO_BODY)
-async def disarm_lease(
-    request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken
-) -> LeaseAnswer:
+async def disarm_lease(held: Held, services: ServicesDep) -> LeaseAnswer:
     """What moves by the lease stops; the arm is kept."""
-    lease = services.leases.arm(_device(services, identifier), token or "", find_owner(request), armed=False)
-    return _answer(services, lease, request.url.path.rsplit("/", 2)[0])
+    return _answer(services, services.leases.arm(*held, armed=False))
 
 
 @router.delete("/{identifier}", status_code=204, summary="Give an arm back", responses=_HELD)
-async def release_lease(request: Request, identifier: Identifier, services: ServicesDep, token: LeaseToken) -> None:
+async def release_lease(held: Held, services: ServicesDep) -> None:
     """What moves by the lease stops. A lease that does not hold any more changes nothing for the present one."""
-    services.leases.release(_device(services, identifier), token or "", find_owner(request))
+    services.leases.release(*held)
 
 
 @stop_router.post("/stop", status_code=202, summary="Stop every arm", openapi_extra=NO_BODY)
@@ -175,15 +185,8 @@ async def stop_everything(services: ServicesDep) -> StopAllAnswer:
     return StopAllAnswer(runs=runs, campaigns=campaigns, time=datetime.now(UTC))
 
 
-def _device(services: Services, identifier: str) -> str:
-    lease = services.leases.find(identifier)
-    if lease is None:
-        raise LeaseLostError(f"{shown(identifier)}: this lease does not hold (any more); take a new one")
-    return lease.device
-
-
-def _answer(services: Services, lease: Lease, root: str, token: str | None = None) -> LeaseAnswer:
-    here = f"{root}/{lease.id}"
+def _answer(services: Services, lease: Lease, token: str | None = None) -> LeaseAnswer:
+    here = f"{ROOT}/leases/{lease.id}"
     links = LeaseLinks(self=here, heartbeat=f"{here}/heartbeat", arm=f"{here}/arm", disarm=f"{here}/disarm")
     left = round(services.leases.seconds_left(lease), 3)
     return LeaseAnswer.describe(

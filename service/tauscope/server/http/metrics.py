@@ -5,6 +5,7 @@ import time
 from collections import Counter as Tally
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor, Future
+from functools import partial
 from typing import Any
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
@@ -136,7 +137,7 @@ class TimedExecutor(Executor):
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
         began = time.monotonic()
-        kind = getattr(getattr(fn, "func", fn), "__name__", "work").removeprefix("run_")
+        kind = fn.args[0].noun if isinstance(fn, partial) else "work"
         future = self._executor.submit(fn, *args, **kwargs)
 
         def note(done: "Future[Any]") -> None:

@@ -249,8 +249,12 @@ def json_body(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
     return {"application/json": {"schema": refer_to_model(model), "examples": shown}}
 
 
-def json_request(model: type[BaseModel], examples: Examples) -> dict[str, Any]:
-    return {"requestBody": {"required": True, "content": json_body(model, examples)}}
+def takes_document(model: type[BaseModel], examples: Examples, *problems: str) -> dict[str, Any]:
+    """What a route with a JSON body says of it. `problems`: codes, beside those of any body."""
+    return {
+        "responses": problem_responses("bad-request", "limit-exceeded", "media-type", *problems),
+        "openapi_extra": {"requestBody": {"required": True, "content": json_body(model, examples)}},
+    }
 
 
 def form_body(parts: Mapping[str, Any], required: Sequence[str]) -> dict[str, Any]:

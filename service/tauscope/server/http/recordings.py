@@ -19,15 +19,8 @@ from tauscope.server.http.reading import READING
 from tauscope.server.http.services import ServicesDep, require_no_evidence
 from tauscope.server.http.tasks.submission import robot_part_rules
 from tauscope.server.problems import ProblemError, problem_responses
-from tauscope.server.queue.received_files import (
-    Understanding,
-    check_kept_recording,
-    read_kept_samples,
-    read_received_robot,
-    understand_recording,
-)
+from tauscope.server.queue import received_files
 from tauscope.server.store.files import KeptFile
-from tauscope.server.store.recordings import StoredRecording
 from tauscope.tasks.task import ReadingOptions
 
 
@@ -74,21 +67,21 @@ async def keep_recording(request: Request, response: Response, services: Service
         kept, is_new = await run_in_threadpool(services.recordings.keep, file)
     response.status_code = 201 if is_new else 200
     response.headers["Location"] = f"{request.url.path}/{quote(kept.name)}"
-    return _answer(kept)
+    return RecordingAnswer.model_validate(kept)
 
 
 @router.get("", summary="List the recordings on the server")
 def list_recordings(services: ServicesDep, limit: RecordingLimit = 1000, after: After = None) -> RecordingListAnswer:
     """Sent ones, and those that the operator put into the folder."""
     entries = [entry for entry in services.recordings.entries() if after is None or entry.name > after]
-    page = [_answer(entry) for entry in entries[:limit]]
+    page = [RecordingAnswer.model_validate(entry) for entry in entries[:limit]]
     return RecordingListAnswer(recordings=page, next=page[-1].name if len(entries) > limit else None)
 
 
 @router.get("/{name}", summary="Look a recording up", responses=problem_responses("not-found"))
 def get_recording(name: Name, services: ServicesDep) -> RecordingAnswer:
     """Size, time and sha256."""
-    return _answer(services.recordings.find(name))
+    return RecordingAnswer.model_validate(services.recordings.find(name))
 
 
 @router.get(
@@ -101,7 +94,7 @@ async def report_on_recording(
 ) -> RecordingReport:
     """What it holds, and what to look at before trusting it."""
     path = await run_in_threadpool(services.recordings.path, name)
-    return await services.reading.call(request, check_kept_recording, path, joint_count)
+    return await services.reading.call(request, received_files.check_kept_recording, path, joint_count)
 
 
 @router.get(
@@ -123,7 +116,7 @@ async def get_samples(request: Request, name: Name, services: ServicesDep, most:
     `shown`), then each column as little-endian 32-bit floats; time counts from the first sample.
     """
     path = await run_in_threadpool(services.recordings.path, name)
-    content = await services.reading.call(request, read_kept_samples, path, most)
+    content = await services.reading.call(request, received_files.read_kept_samples, path, most)
     return Response(content, media_type="application/octet-stream")
 
 
@@ -151,10 +144,6 @@ def remove_recording(name: Name, services: ServicesDep) -> None:
     services.recordings.remove(name)
 
 
-def _answer(recording: StoredRecording) -> RecordingAnswer:
-    return RecordingAnswer.model_validate(recording)
-
-
 mapping_router = APIRouter(prefix="/mappings", tags=["recordings"], responses=problem_responses("invalid-request"))
 
 _MAPPING_BODY = form_body(
@@ -173,7 +162,7 @@ _MAPPING_BODY = form_body(
     responses=problem_responses("bad-request", "limit-exceeded", "media-type", "robot-file", *READING),
     openapi_extra={"requestBody": {"required": True, "content": _MAPPING_BODY}},
 )
-async def check_sent_recording(request: Request, services: ServicesDep) -> Understanding:
+async def check_sent_recording(request: Request, services: ServicesDep) -> received_files.Understanding:
     """Its columns and units as they are understood, and what it holds when it is read so; nothing is kept."""
     async with contextmanager_in_threadpool(services.recordings.stage()) as folder:
         settings, robots = services.settings, FilePath(folder) / "robot"
@@ -186,8 +175,10 @@ async def check_sent_recording(request: Request, services: ServicesDep) -> Under
         form = await receive_form(request, rules)
         file, robot_file = _require_file(form), form.file("robot")
         options = parse_document(form.texts.get("request", b"{}"), ReadingRequest, within="part request")
-        robot = robot_file and await run_in_threadpool(read_received_robot, robots, robot_file.name)
-        return await services.reading.call(request, understand_recording, file.path, robot, options.reading)
+        robot = robot_file and await run_in_threadpool(received_files.read_received_robot, robots, robot_file.name)
+        return await services.reading.call(
+            request, received_files.understand_recording, file.path, robot, options.reading
+        )
 
 
 def _require_file(form: ReceivedForm) -> KeptFile:

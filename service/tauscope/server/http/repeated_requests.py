@@ -34,9 +34,6 @@ class KeptAnswer(StrictModel):
     headers: tuple[tuple[str, str], ...] = Field(description="of the answer")
     body: str = Field(description="of the answer, in base64")
 
-    def content(self) -> bytes:
-        return base64.b64decode(self.body)
-
 
 _TIDY_EVERY = 500
 
@@ -158,9 +155,8 @@ class IdempotentRequests(HttpMiddleware):
         # What was refused has done nothing, and may be corrected and sent again.
         if not 400 <= answer.status < 500:
             body = base64.b64encode(bytes(answer.body)).decode()
-            kept = KeptAnswer(
-                fingerprint=fingerprint.digest(), status=answer.status, headers=answer.header_texts(), body=body
-            )
+            headers = tuple((name.decode("latin-1"), value.decode("latin-1")) for name, value in answer.headers)
+            kept = KeptAnswer(fingerprint=fingerprint.digest(), status=answer.status, headers=headers, body=body)
         await run_in_threadpool(store.finish, name, kept)
         for message in answer.messages:
             await send(message)
@@ -182,17 +178,14 @@ class _Captured:
         self.messages: list[Message] = []
         self.status = 500
         self.body = bytearray()
-        self._headers: list[tuple[bytes, bytes]] = []
+        self.headers: list[tuple[bytes, bytes]] = []
 
     async def take(self, message: Message) -> None:
         self.messages.append(message)
         if message["type"] == "http.response.start":
-            self.status, self._headers = message["status"], list(message["headers"])
+            self.status, self.headers = message["status"], list(message["headers"])
         elif message["type"] == "http.response.body":
             self.body += message.get("body", b"")
-
-    def header_texts(self) -> tuple[tuple[str, str], ...]:
-        return tuple((name.decode("latin-1"), value.decode("latin-1")) for name, value in self._headers)
 
 
 def _count_body(receive: Receive, fingerprint: Fingerprint) -> Receive:
@@ -222,7 +215,7 @@ async def _repeat(scope: AsgiScope, receive: Receive, store: StoredAnswers, name
     if kept.status < 500 and kept.fingerprint != fingerprint.digest():
         text = "this Idempotency-Key was sent with another body before; use a new key for a new request"
         return problem_answer(make_problem("key-reused", text, scope["path"]))
-    answer = Response(kept.content(), kept.status)
+    answer = Response(base64.b64decode(kept.body), kept.status)
     answer.raw_headers = [(k.encode("latin-1"), v.encode("latin-1")) for k, v in kept.headers]
     answer.headers["Idempotency-Replayed"] = "true"
     return answer

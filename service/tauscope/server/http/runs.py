@@ -7,8 +7,7 @@ from datetime import datetime
 from functools import partial
 from typing import Annotated, Any, Literal, Self
 
-from fastapi import Query, Request
-from fastapi.concurrency import contextmanager_in_threadpool
+from fastapi import Query
 from fastapi.responses import FileResponse
 from pydantic import Field, JsonValue, model_validator
 from pydantic_core import PydanticCustomError
@@ -16,41 +15,32 @@ from starlette.concurrency import run_in_threadpool
 from typing_extensions import override
 
 from tauscope.errors import ExcitationError, NotFoundError
-from tauscope.robot import Robot
 from tauscope.runtime.options import RunOptions
 from tauscope.runtime.record import RunRecord
 from tauscope.runtime.states import RunState
 from tauscope.runtime.timing import RealTime, Timing
 from tauscope.server.control.leases import Permit
 from tauscope.server.control.run import (
-    Motion,
     RunRequestRecord,
     RunWorkspace,
     await_design,
     ready_motion,
     take_trajectory,
 )
-from tauscope.server.control.run_manager import RunManager, run_recording_name
-from tauscope.server.http.answers import AnswerModel, Identifier, MotionLinks, convert_problem
+from tauscope.server.control.run_manager import run_recording_name
+from tauscope.server.http.answers import AnswerModel, Identifier, MotionLinks, convert_problem, describe_damaged
 from tauscope.server.http.bodies import PartRule, file_answer, to_json_text
 from tauscope.server.http.excitations import EXCITATIONS
 from tauscope.server.http.leases import permit_of
 from tauscope.server.http.openapi import binary_part, file_responses
 from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.settings import Settings
+from tauscope.server.http.tasks import submission
 from tauscope.server.http.tasks.router import MovingResource
-from tauscope.server.http.tasks.submission import (
-    EXAMPLE_ROBOT,
-    BackendRequest,
-    Received,
-    RobotRequest,
-    choose_backend,
-    keep_robot,
-    receive_request,
-)
-from tauscope.server.problems import Problem, ProblemError, make_problem
+from tauscope.server.problems import Problem, ProblemError
 from tauscope.server.queue.analyses import ExcitationOrder, ExcitationWorkspace
-from tauscope.server.queue.received_files import check_trajectory, read_received_robot
-from tauscope.server.queue.task_job import stage_workspace, submit_job
+from tauscope.server.queue.received_files import check_trajectory
+from tauscope.server.queue.task_job import submit_job
 from tauscope.server.store.event_log import EventLog
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.run import BackendChoice
@@ -58,10 +48,10 @@ from tauscope.tasks.run import BackendChoice
 RecordingFormat = Literal["mcap", "csv", "parquet"]
 
 
-class RunRequest(RunOptions, RobotRequest, strict=True):
+class RunRequest(RunOptions, submission.RobotRequest, strict=True):
     """Which run is wanted."""
 
-    backend: BackendRequest = Field(default=BackendRequest(), description="which arm is moved")
+    backend: submission.BackendRequest = Field(default=submission.BackendRequest(), description="which arm is moved")
     excitation: str | None = Field(
         default=None,
         description="identifier of an excitation that succeeded; its robot is taken where none is sent; null, and no"
@@ -79,11 +69,14 @@ class RunRequest(RunOptions, RobotRequest, strict=True):
 
 
 EXAMPLES: dict[str, tuple[str, Any]] = {
-    "default": ("The default motion on the simulated arm", {"robot": EXAMPLE_ROBOT, "backend": {"name": "sim"}}),
+    "default": (
+        "The default motion on the simulated arm",
+        {"robot": submission.EXAMPLE_ROBOT, "backend": {"name": "sim"}},
+    ),
     "options": (
         "The host closes the loop, 250 times a second, against the clock",
         {
-            "robot": EXAMPLE_ROBOT,
+            "robot": submission.EXAMPLE_ROBOT,
             "backend": {"name": "sim", "time": "real"},
             "mode": "torque",
             "rate_hz": 250.0,
@@ -182,35 +175,22 @@ def _links(here: str, excitation: str | None, record: RunRecord | None, workspac
 LARGEST_TRAJECTORY = 64 * 2**20  # bytes of the largest trajectory file that is accepted
 
 
-def _put_robot(received: Received[RunRequest], services: Services, workspace: RunWorkspace) -> str:
-    document, has_robot = received.document, received.form.file("robot") or received.document.robot
-    if document.excitation is None or has_robot:
-        return keep_robot(received, workspace.robot, services.robots)
-    excitation = EXCITATIONS.finished(services, document.excitation)
-    order = excitation.read_order()
-    shutil.copytree(excitation.robot, workspace.robot, dirs_exist_ok=True)
-    return "robot.yaml" if order is None else order.robot_file
-
-
-def _prepare(
-    received: Received[RunRequest], services: Services, workspace: RunWorkspace, robot_file: str, robot: Robot
-) -> tuple[RunRequestRecord, bool]:
+def _prepare(handed: submission.Submission[RunRequest]) -> tuple[RunRequestRecord, bool]:
     """What is asked for, and whether its trajectory was sent."""
-    document, is_sent = received.document, received.form.file("trajectory") is not None
+    document, is_sent = handed.document, handed.form.file("trajectory") is not None
     if document.trajectory is not None:
         if is_sent:
             raise ProblemError("invalid-request", "the trajectory came twice, as a part and in part request; send one")
         text = to_json_text(document.trajectory, "trajectory", ExcitationError)
-        (workspace.trajectories / "trajectory.json").write_text(text, encoding="utf-8")
+        (handed.workspace.trajectories / "trajectory.json").write_text(text, encoding="utf-8")
         is_sent = True
     if is_sent and document.excitation is not None:
         raise ProblemError("invalid-request", "excitation and trajectory were both given; give one motion")
-    backend = choose_backend(services.settings, document.backend, robot)
+    backend = submission.choose_backend(handed.services.settings, document.backend, handed.robot)
     order = RunRequestRecord(
-        robot_file=robot_file,
-        robot_name=robot.name,
+        **handed.robot_fields,
         backend=backend,
-        device=backend.device(robot.name),
+        device=backend.device(handed.robot.name),
         excitation=document.excitation,
         options=RunOptions.model_validate(document.model_dump(include=set(RunOptions.model_fields))),
     )
@@ -218,26 +198,27 @@ def _prepare(
 
 
 def _submit(
-    order: RunRequestRecord, seed: int | None, services: Services, workspace: RunWorkspace, permit: Permit
+    order: RunRequestRecord, handed: submission.Submission[RunRequest], permit: Permit, *, is_sent: bool
 ) -> str:
-    """Start a run; `seed`: of the motion that is designed first, None where there is one."""
+    """Start a run; where there is no motion, one is designed first."""
+    services, workspace = handed.services, handed.workspace
+    kind, motion = services.kinds["excitation"], ready_motion
     services.runs.claims.require_free(order.device)
-    motion: Motion = ready_motion
     if order.excitation is not None:
         take_trajectory(EXCITATIONS.finished(services, order.excitation), workspace)
-    elif seed is not None:
-        options = ExcitationDesignOptions(seed=seed)
-        design = ExcitationOrder(robot_file=order.robot_file, robot_name=order.robot_name, options=options)
+    elif not is_sent:
+        options = ExcitationDesignOptions(seed=handed.document.seed)
+        design = ExcitationOrder(**handed.robot_fields, options=options)
         put_robot = partial(shutil.copytree, workspace.robot, dirs_exist_ok=True)
-        identifier = submit_job(services.jobs, services.excitations, ExcitationWorkspace, design, put_robot)
+        identifier = submit_job(services.jobs, kind, ExcitationWorkspace, design, put_robot)
         order = order.model_copy(update={"excitation": identifier})
-        motion = await_design(services.jobs, services.excitations, identifier)
+        motion = await_design(services.jobs, kind, identifier)
     workspace.write_order(order)
     try:
         return services.runs.submit(workspace.folder, motion, permit=permit)
     except BaseException:
         if motion is not ready_motion:
-            services.jobs.cancel(services.excitations, order.excitation or "")
+            services.jobs.cancel(kind, order.excitation or "")
         raise
 
 
@@ -246,33 +227,18 @@ Format = Annotated[RecordingFormat, Query(alias="format", description="mcap: the
 
 class Runs(MovingResource):
     @override
-    def manager(self, services: Services) -> RunManager:
-        return services.runs
-
-    @override
-    def find(self, services: Services, identifier: str) -> RunWorkspace:
-        return RunWorkspace(services.runs.items.folder(identifier))
-
-    @override
     def follow(self, services: Services, identifier: str) -> FollowedRun:
         workspace = self.find(services, identifier)
         return FollowedRun(workspace.events, lambda: services.runs.live(identifier) is None and workspace.has_ended())
 
     @override
-    def read_state(self, services: Services, identifier: str) -> RunState | None:
-        record = self.find(services, identifier).read_run()
-        return None if record is None else record.state
-
-    @override
-    def describe(self, services: Services, identifier: str, root: str) -> RunAnswer:
-        workspace, live = self.find(services, identifier), services.runs.live(identifier)
-        here = f"{root}/runs/{identifier}"
-        record, request = workspace.read_run(), workspace.read_order()
+    def describe(self, services: Services, identifier: str) -> RunAnswer:
+        workspace, live, here = self.find(services, identifier), services.runs.live(identifier), self.path(identifier)
+        record, request = workspace.read_record(), workspace.read_order()
         if record is None or request is None:
-            detail = f"files of {identifier} are missing or damaged; remove it and hand it in again"
-            problem = make_problem("damaged", detail, here)
-            return RunAnswer(id=identifier, state="damaged", problem=problem, links=_links(here, None, None, workspace))
+            return RunAnswer(**describe_damaged(identifier, here), links=_links(here, None, None, workspace))
         goes_on = live is not None and not record.state.is_end
+        excitation = request.excitation and EXCITATIONS.path(request.excitation)
         return RunAnswer.describe(
             record,
             id=identifier,
@@ -286,31 +252,41 @@ class Runs(MovingResource):
             campaign=request.campaign,
             problem=convert_problem(workspace.problem(), here),
             recording=_recording(services, identifier, record),
-            links=_links(here, request.excitation and f"{root}/excitations/{request.excitation}", record, workspace),
+            links=_links(here, excitation, record, workspace),
         )
 
     @override
-    async def submit(self, request: Request, services: Services) -> str:
-        async with contextmanager_in_threadpool(stage_workspace(services.runs.items, RunWorkspace)) as workspace:
-            most = min(LARGEST_TRAJECTORY, services.settings.max_upload_bytes)
-            parts = {"trajectory": PartRule(most, workspace.trajectories, default_name="trajectory.json")}
-            received = await receive_request(request, RunRequest, services.settings, workspace.robot, parts)
-            robot_file = await run_in_threadpool(_put_robot, received, services, workspace)
-            robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
-            order, is_sent = await run_in_threadpool(_prepare, received, services, workspace, robot_file, robot)
-            permit = permit_of(request, services, order.device)
-            if is_sent:
-                await services.reading.call(
-                    request, check_trajectory, workspace.trajectories, workspace.robot / robot_file
-                )
-            seed = None if is_sent else received.document.seed
-            return await run_in_threadpool(_submit, order, seed, services, workspace, permit)
+    def part_rules(self, settings: Settings, workspace: RunWorkspace) -> dict[str, PartRule]:
+        most = min(LARGEST_TRAJECTORY, settings.max_upload_bytes)
+        return {"trajectory": PartRule(most, workspace.trajectories, default_name="trajectory.json")}
+
+    @override
+    def put_robot(self, received: submission.Received[RunRequest], services: Services, workspace: RunWorkspace) -> str:
+        document, has_robot = received.document, received.form.file("robot") or received.document.robot
+        if document.excitation is None or has_robot:
+            return super().put_robot(received, services, workspace)
+        excitation = EXCITATIONS.finished(services, document.excitation)
+        order = excitation.read_order()
+        shutil.copytree(excitation.robot, workspace.robot, dirs_exist_ok=True)
+        return "robot.yaml" if order is None else order.robot_file
+
+    @override
+    async def hand_over(self, handed: submission.Submission[RunRequest]) -> str:
+        request, services, workspace = handed.request, handed.services, handed.workspace
+        order, is_sent = await run_in_threadpool(_prepare, handed)
+        permit = permit_of(request, services, order.device)
+        if is_sent:
+            robot_file = workspace.robot / handed.robot_file
+            await services.reading.call(request, check_trajectory, workspace.trajectories, robot_file)
+        return await run_in_threadpool(_submit, order, handed, permit, is_sent=is_sent)
 
 
 RUNS = Runs(
     noun="a run",
     plural="runs",
     models=(RunRequest, RunAnswer),
+    workspace=RunWorkspace,
+    manager=lambda services: services.runs,
     examples=EXAMPLES,
     summary="Begin a run",
     words="The arm moves as soon as there is a motion: follow `Location` until it has ended, or stop it at any time."

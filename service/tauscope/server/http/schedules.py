@@ -3,15 +3,13 @@
 from datetime import datetime
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path, Request
+from fastapi import APIRouter, Path
 from pydantic import Field
-from starlette.concurrency import run_in_threadpool
 
-from tauscope.server.http.answers import AnswerModel, Limit, collection
-from tauscope.server.http.bodies import read_document
+from tauscope.server.http.answers import ROOT, AnswerModel, Limit
 from tauscope.server.http.history import ReasonRequest
-from tauscope.server.http.openapi import json_request
-from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.openapi import takes_document
+from tauscope.server.http.services import ServicesDep, document_of
 from tauscope.server.problems import problem_responses
 from tauscope.server.schedules.definition import ScheduleDefinition
 from tauscope.server.schedules.repository import FiringEntry
@@ -87,36 +85,36 @@ class FiringListAnswer(AnswerModel):
 
 router = APIRouter(prefix="/schedules", tags=["schedules"], responses=problem_responses("store"))
 Name = Annotated[str, Path(pattern="^[a-z0-9][a-z0-9-]{0,62}$", description="its name", examples=["cell3-nightly"])]
-_BODY_PROBLEMS = ("bad-request", "limit-exceeded", "media-type", "not-found")
 
 
 @router.get("", summary="List schedules")
-def list_schedules(request: Request, services: ServicesDep) -> ScheduleListAnswer:
+def list_schedules(services: ServicesDep) -> ScheduleListAnswer:
     """Those of every service that shares the database."""
     entries = services.schedules.repository.schedules()
-    return ScheduleListAnswer(schedules=[_answer(entry, request.url.path) for entry in entries])
+    return ScheduleListAnswer(schedules=[_answer(entry) for entry in entries])
 
 
 @router.put(
-    "/{name}",
-    summary="Set a schedule up, or change it",
-    responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra=json_request(ScheduleRequest, EXAMPLES),
+    "/{name}", summary="Set a schedule up, or change it", **takes_document(ScheduleRequest, EXAMPLES, "not-found")
 )
-async def put_schedule(request: Request, name: Name, services: ServicesDep) -> ScheduleAnswer:
+def put_schedule(
+    body: Annotated[ScheduleRequest, document_of(ScheduleRequest)], name: Name, services: ServicesDep
+) -> ScheduleAnswer:
     """It repeats something that was done once. What is due while no service runs is made up for once, or passed over.
 
     Nothing is started outside of its window, while what it started last goes on, while somebody else has the arm, or
     where the interlock objects; such a firing is skipped, and never repeated by itself.
     """
-    body = await read_document(request, ScheduleRequest, services.settings.max_document_bytes)
-    return _answer(await run_in_threadpool(_put, name, body, services), collection(request, 1))
+    scheduler = services.schedules
+    site = None if body.anywhere else scheduler.repository.site
+    scheduler.repository.put(make_schedule(name, body.like, body.definition, scheduler.repeater, site, utc_now()))
+    return _answer(scheduler.repository.find(name))
 
 
 @router.get("/{name}", summary="Look a schedule up", responses=problem_responses("not-found"))
-def get_schedule(request: Request, name: Name, services: ServicesDep) -> ScheduleAnswer:
+def get_schedule(name: Name, services: ServicesDep) -> ScheduleAnswer:
     """What is repeated, and when it is due next."""
-    return _answer(services.schedules.repository.find(name), collection(request, 1))
+    return _answer(services.schedules.repository.find(name))
 
 
 @router.delete("/{name}", status_code=204, summary="Remove a schedule", responses=problem_responses("not-found"))
@@ -136,32 +134,24 @@ def list_firings(name: Name, services: ServicesDep, limit: Limit = 100) -> Firin
     "/{name}/run",
     status_code=202,
     summary="Do what a schedule does now",
-    responses=problem_responses(*_BODY_PROBLEMS),
-    openapi_extra=json_request(ReasonRequest, {"why": ("Why", {"reason": "a test"})}),
+    dependencies=[document_of(ReasonRequest)],
+    **takes_document(ReasonRequest, {"why": ("Why", {"reason": "a test"})}, "not-found"),
 )
-async def run_schedule(request: Request, name: Name, services: ServicesDep) -> FiringAnswer:
+def run_schedule(name: Name, services: ServicesDep) -> FiringAnswer:
     """As if it were due: window, interlock and whatever goes on are looked at. The service of its site does it."""
-    await read_document(request, ReasonRequest, services.settings.max_document_bytes)
-    return _firing(await run_in_threadpool(services.schedules.fire_now, name))
+    return _firing(services.schedules.fire_now(name))
 
 
-def _put(name: str, body: ScheduleRequest, services: Services) -> Schedule:
-    scheduler = services.schedules
-    site = None if body.anywhere else scheduler.repository.site
-    scheduler.repository.put(make_schedule(name, body.like, body.definition, scheduler.repeater, site, utc_now()))
-    return scheduler.repository.find(name)
-
-
-def _answer(entry: Schedule, path: str) -> ScheduleAnswer:
+def _answer(entry: Schedule) -> ScheduleAnswer:
     robot = entry.order.get("robot_name")
     return ScheduleAnswer.describe(
         entry,
         robot=robot if isinstance(robot, str) else None,
         definition=read_definition(entry),
-        firings=f"{path}/{entry.name}/firings",
+        firings=f"{ROOT}/schedules/{entry.name}/firings",
     )
 
 
 def _firing(entry: FiringEntry) -> FiringAnswer:
-    item = None if entry.item is None else f"/api/v1/{FOLDERS[entry.item[0]]}/{entry.item[1]}"
+    item = None if entry.item is None else f"{ROOT}/{FOLDERS[entry.item[0]]}/{entry.item[1]}"
     return FiringAnswer.describe(entry, item=item)

@@ -13,6 +13,7 @@ from typing import Annotated, Any, cast
 
 from anyio import CapacityLimiter
 from fastapi import Depends, Request
+from pydantic import BaseModel
 
 from tauscope.errors import NotFoundError, TauscopeError
 from tauscope.server.auth.audit_log import AuditLog, AuditTrail
@@ -26,6 +27,7 @@ from tauscope.server.history.indexer import Indexer, open_index
 from tauscope.server.history.model_history import ModelHistory
 from tauscope.server.history.model_registry import DriftMonitor, ModelRegistry
 from tauscope.server.history.retention import RetentionRule, sweep
+from tauscope.server.http.bodies import read_document
 from tauscope.server.http.metrics import Metrics, ModelDrift, TimedExecutor
 from tauscope.server.http.readiness import Clock, Heartbeat, Readiness, check_database, check_disk
 from tauscope.server.http.reading import WIDTH, ReadingQueue
@@ -33,16 +35,11 @@ from tauscope.server.http.repeated_requests import StoredAnswers
 from tauscope.server.http.settings import Settings
 from tauscope.server.http.tasks.event_feeds import EventFeeds
 from tauscope.server.problems import ProblemError
-from tauscope.server.queue.analyses import (
-    IdentificationWorkspace,
-    run_diagnosis,
-    run_excitation,
-    run_identification,
-    run_rollout,
-)
+from tauscope.server.queue.analyses import HEAVY, TASKS, IdentificationWorkspace
 from tauscope.server.queue.cluster_executor import ClusterExecutor, open_executor
 from tauscope.server.queue.housekeeping import Housekeeping
 from tauscope.server.queue.queue import JobKind, JobQueue
+from tauscope.server.queue.task_job import perform_job
 from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.server.schedules.repository import ScheduleRepository
 from tauscope.server.schedules.scheduler import Repeater, Scheduler, new_boot
@@ -60,10 +57,8 @@ class Services:
     settings: Settings
     recordings: RecordingStore
     robots: RobotStore
-    identifications: JobKind
-    diagnoses: JobKind
-    rollouts: JobKind
-    excitations: JobKind
+    items: Mapping[str, ItemStore]
+    kinds: Mapping[str, JobKind]
     jobs: JobQueue
     runs: RunManager
     campaigns: CampaignManager
@@ -82,6 +77,11 @@ class Services:
     feeds: EventFeeds
     followers: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(4))
 
+    def judge_new(self) -> None:
+        """Judge every identification: one that ended a moment ago may become the active model."""
+        self.index.refresh()
+        self.models.judge_new()
+
     def begin_to_close(self) -> None:
         """Stop every arm, and let go of whoever follows events; returns at once."""
         self.closing.set()
@@ -95,6 +95,17 @@ async def _services_of(request: Request) -> Services:
 
 
 ServicesDep = Annotated[Services, Depends(_services_of)]  # the services, as an argument of a route
+
+
+def document_of(kind: type[BaseModel]) -> Any:
+    """The JSON body of a request, as an argument of a route: the framework would read one of any size."""
+
+    async def read(request: Request, services: ServicesDep) -> BaseModel:
+        return await read_document(request, kind, services.settings.max_document_bytes)
+
+    return Depends(read)
+
+
 PRUNING_S = 3600.0  # how often what is old is removed, where the operator asked for it [s]
 DAY_S = 86400.0
 REQUESTS_PER_S = 200.0  # how often a key may call in the long run, where the operator says nothing [1/s]
@@ -180,20 +191,37 @@ def _assemble(
     items, metrics, heartbeat = item_stores(settings.data_folder), Metrics(), Heartbeat()
     recordings = RecordingStore(settings.recordings_folder)
     recordings.tidy()
-    identifications, diagnoses, excitations, rollouts = kinds = _kinds(settings, items)
+    kinds = {
+        noun: JobKind(items[noun], partial(perform_job, kind, settings.recordings_folder), is_heavy=noun in HEAVY)
+        for noun, kind in TASKS.items()
+    }
     pool = executor or open_executor(settings.workers, deadline_s=settings.job_timeout_s)
     timed = TimedExecutor(pool, metrics.job_seconds)
     bounds: dict[str, Any] = {"slots": settings.workers, "most_waiting": settings.max_waiting}
     if isinstance(pool, ClusterExecutor):  # it comes and goes, and so do its workers
         bounds |= {"slots": lambda: pool.width, "is_there": pool.is_there}
-    jobs = JobQueue(kinds, timed, most_each=settings.max_jobs_per_caller, **bounds)
+    jobs = JobQueue([*kinds.values()], timed, most_each=settings.max_jobs_per_caller, **bounds)
     audit = AuditTrail(AuditLog(settings.data_folder))
     claims, closing = DeviceClaims(settings.max_arms), threading.Event()
     leases = Leases(claims, on_end=partial(_note_end, audit))
     start = start or partial(start_control, sim_socket=settings.sim_socket)
     runs = RunManager(items["run"], recordings, start, claims, heartbeat.is_alive, metrics.run_ended)
-    dependencies = CampaignDependencies(jobs, excitations, identifications, diagnoses, runs, recordings)
+    dependencies = CampaignDependencies(jobs, kinds, runs, recordings)
     campaigns = CampaignManager(items["campaign"], dependencies)
+
+    def check_workers() -> str | None:
+        if not jobs.can_work():
+            return "the Dask cluster does not answer, and jobs wait for it"
+        return readers.obstacle if isinstance(readers, WorkerPool) else None
+
+    checks = {
+        "service": lambda: "the service is ending" if closing.is_set() else None,
+        "database": partial(check_database, database.check),
+        "disk": partial(check_disk, settings.data_folder),
+        "workers": check_workers,
+        "clock": Clock().check,
+        "audit log": lambda: f"{audit.lost} entries of the audit log were lost" if audit.lost else None,
+    }
     models = ModelRegistry(ModelHistory(database), site, items)
     index = open_index(Index(database, site), items, recordings, settings.data_folder.name)
     # What a schedule moves has no lease: it waits for its next time where somebody has one.
@@ -202,10 +230,8 @@ def _assemble(
         settings=settings,
         recordings=recordings,
         robots=RobotStore(settings.data_folder / "robots"),
-        identifications=identifications,
-        diagnoses=diagnoses,
-        rollouts=rollouts,
-        excitations=excitations,
+        items=items,
+        kinds=kinds,
         jobs=jobs,
         runs=runs,
         campaigns=campaigns,
@@ -215,7 +241,7 @@ def _assemble(
         audit=audit,
         answers=StoredAnswers(settings.data_folder / "idempotency"),
         metrics=metrics,
-        readiness=Readiness(_collect_checks(settings, database, jobs, readers, audit, closing)),
+        readiness=Readiness(checks),
         closing=closing,
         feeds=EventFeeds(closing),
         heartbeat=heartbeat,
@@ -225,42 +251,9 @@ def _assemble(
     )
 
 
-def _collect_checks(
-    settings: Settings,
-    database: Database,
-    jobs: JobQueue,
-    readers: Executor,
-    audit: AuditTrail,
-    closing: threading.Event,
-) -> dict[str, Callable[[], str | None]]:
-    def check_workers() -> str | None:
-        if not jobs.can_work():
-            return "the Dask cluster does not answer, and jobs wait for it"
-        return readers.obstacle if isinstance(readers, WorkerPool) else None
-
-    return {
-        "service": lambda: "the service is ending" if closing.is_set() else None,
-        "database": partial(check_database, database.check),
-        "disk": partial(check_disk, settings.data_folder),
-        "workers": check_workers,
-        "clock": Clock().check,
-        "audit log": lambda: f"{audit.lost} entries of the audit log were lost" if audit.lost else None,
-    }
-
-
 def open_readers(settings: Settings) -> Executor:
     bounds = {"deadline_s": settings.reading_timeout_s, "memory_bytes": settings.reading_memory_bytes}
     return WorkerPool(WIDTH, **bounds)
-
-
-def _kinds(settings: Settings, items: Mapping[str, ItemStore]) -> tuple[JobKind, JobKind, JobKind, JobKind]:
-    where = {"server_recordings": settings.recordings_folder}
-    return (
-        JobKind(items["identification"], partial(run_identification, **where)),
-        JobKind(items["diagnosis"], partial(run_diagnosis, **where), is_heavy=True),
-        JobKind(items["excitation"], run_excitation),
-        JobKind(items["rollout"], partial(run_rollout, **where), is_heavy=True),
-    )
 
 
 def _retention(services: Services) -> list[Callable[[], object]]:
@@ -270,10 +263,7 @@ def _retention(services: Services) -> list[Callable[[], object]]:
     kinds = frozenset(settings.prune_kinds or FOLDERS)
     rule = RetentionRule(timedelta(days=settings.prune_older_than_days), kinds, settings.prune_recordings)
     removers: dict[str, Callable[[str], object]] = {
-        "identification": partial(jobs.cancel_or_remove, services.identifications),
-        "diagnosis": partial(jobs.cancel_or_remove, services.diagnoses),
-        "rollout": partial(jobs.cancel_or_remove, services.rollouts),
-        "excitation": partial(jobs.cancel_or_remove, services.excitations),
+        **{name: partial(jobs.cancel_or_remove, kind) for name, kind in services.kinds.items()},
         "run": services.runs.remove,
         "campaign": services.campaigns.remove,
     }
@@ -330,33 +320,27 @@ def require_data_folder(settings: Settings) -> None:
 
 
 def require_no_model(services: Services, identifier: str) -> None:
-    _judge_new(services)
+    services.judge_new()
     _require_free(services, identifier, {identifier})
 
 
 def require_no_evidence(services: Services, recording: str) -> None:
     """Raises ProblemError if an active model or a reference was made from or judged by a recording."""
-    _judge_new(services)
+    services.judge_new()
     _require_free(services, recording, services.index.index.list_users(recording))
 
 
 def require_no_identification(services: Services, version: str) -> None:
     """Raises ProblemError if an active model or a reference was identified with a robot."""
-    _judge_new(services)
+    services.judge_new()
     users = set()
     for identifier in services.models.history.list_protected():
         with suppress(NotFoundError):  # of another service
-            workspace = IdentificationWorkspace(services.identifications.items.folder(identifier))
+            workspace = IdentificationWorkspace(services.items["identification"].folder(identifier))
             order = workspace.read_order()
             if order is not None and hash_robot(workspace.robot, order.robot_file) == version:
                 users.add(identifier)
     _require_free(services, version, users)
-
-
-def _judge_new(services: Services) -> None:
-    """Judge every identification: one that ended a moment ago may become the active model."""
-    services.index.refresh()
-    services.models.judge_new()
 
 
 def _require_free(services: Services, name: str, users: Collection[str]) -> None:

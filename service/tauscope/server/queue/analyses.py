@@ -1,7 +1,6 @@
 """Jobs of the queue: what each kind of order and folder holds, and the work."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from pydantic import Field
@@ -9,8 +8,7 @@ from pydantic import Field
 from tauscope.errors import LimitExceededError, NotFoundError
 from tauscope.export.formats import CODE_FILES, EXPORT_FILES
 from tauscope.robot import read_robot
-from tauscope.server.queue.job_folder import JobProblem
-from tauscope.server.queue.task_job import TRAJECTORY, OrderedRecording, TaskOrder, TaskWorkspace, perform_job
+from tauscope.server.queue.task_job import TRAJECTORY, OrderedRecording, TaskOrder, TaskWorkspace
 from tauscope.tasks import design_excitation, diagnose, identify, rollout
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.diagnose import DiagnosisOptions
@@ -42,10 +40,6 @@ class IdentificationWorkspace(TaskWorkspace[IdentificationOrder]):
     formats = EXPORT_FILES
 
 
-def run_identification(folder: Path, server_recordings: Path) -> JobProblem | None:
-    return perform_job(IdentificationWorkspace(folder), server_recordings)
-
-
 class DiagnosisOrder(TaskOrder):
     task = diagnose
 
@@ -74,10 +68,6 @@ class DiagnosisWorkspace(TaskWorkspace[DiagnosisOrder]):
     formats = CODE_FILES
 
 
-def run_diagnosis(folder: Path, server_recordings: Path) -> JobProblem | None:
-    return perform_job(DiagnosisWorkspace(folder), server_recordings)
-
-
 class RolloutOrder(TaskOrder):
     task = rollout
 
@@ -96,10 +86,6 @@ class RolloutWorkspace(TaskWorkspace[RolloutOrder]):
     outputs: ClassVar[Mapping[str, str | None]] = {"report.html": None, "result.json": "tauscope.rollout/1"}
 
 
-def run_rollout(folder: Path, server_recordings: Path) -> JobProblem | None:
-    return perform_job(RolloutWorkspace(folder), server_recordings)
-
-
 MOST_ROWS = 2_000_000  # rows of the longest CSV that is made on request
 
 
@@ -116,8 +102,10 @@ class ExcitationWorkspace(TaskWorkspace[ExcitationOrder]):
     outputs: ClassVar[Mapping[str, str | None]] = {TRAJECTORY: None, "result.json": "tauscope.excitation/1"}
 
 
-def run_excitation(folder: Path) -> JobProblem | None:
-    return perform_job(ExcitationWorkspace(folder), folder)
+TASKS: Mapping[str, type[TaskWorkspace[Any]]] = {
+    kind.noun: kind for kind in (IdentificationWorkspace, DiagnosisWorkspace, ExcitationWorkspace, RolloutWorkspace)
+}
+HEAVY = ("diagnosis", "rollout")  # their work takes minutes
 
 
 def write_trajectory_piece(workspace: TaskWorkspace[Any], rate_hz: float, start: int) -> bytes:

@@ -66,7 +66,7 @@ class ClusterExecutor(Executor):
     def __init__(self, address: str, wait_s: float = 0.0) -> None:
         """`wait_s`: for a scheduler that is away [s]. Raises StoreError if it does not answer, or without Dask."""
         self._address, self._wait_s = address, wait_s
-        self._width = 1
+        self.width = 1  # tasks that the cluster did at a time when it was last looked at, at least one
         self._closing = threading.Event()
         self._there = threading.Event()
         self._loop = LoopThread("cluster loop")
@@ -78,11 +78,6 @@ class ClusterExecutor(Executor):
             raise _not_reached(address, error) from None
         self._watcher = threading.Thread(target=self._watch, name="cluster", daemon=True)
         self._watcher.start()
-
-    @property
-    def width(self) -> int:
-        """Tasks that the cluster did at a time when it was last looked at, at least one; asks nobody."""
-        return self._width
 
     def is_there(self) -> bool:
         """Whether the scheduler answers; asks nobody."""
@@ -142,7 +137,7 @@ class ClusterExecutor(Executor):
             # `Client.nthreads` asks the same, and waits for ever where the scheduler is lost meanwhile.
             scheduler: Any = self._client.scheduler
             threads: Any = self._client.sync(scheduler.ncores, callback_timeout=TIMEOUT_S)
-            self._width = max(1, sum(threads.values()))
+            self.width = max(1, sum(threads.values()))
             self._there.set()
         else:
             self._there.clear()

@@ -2,7 +2,7 @@
 
 import csv
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -161,12 +161,10 @@ def _entry(path: Path, line: int, row: dict[str, str], names: dict[str, int]) ->
     if name in names:
         raise RecordingError(f"{place}: name {name} is that of line {names[name]} too; give each robot its own")
     names[name] = line
-    recordings, held_out = (_paths(path.parent, row[column]) for column in ("recordings", "held_out"))
+    recordings, held_out = (
+        tuple(find_path(word, path.parent) for word in map(str.strip, row[column].split(SEPARATOR)) if word)
+        for column in ("recordings", "held_out")
+    )
     if not recordings or not row["robot"].strip():
         raise RecordingError(f"{place}: names no {'recording' if row['robot'].strip() else 'robot file'}; name one")
     return FleetEntry(line, name, find_path(row["robot"].strip(), path.parent), recordings, held_out)
-
-
-def _paths(folder: Path, text: str) -> tuple[Path, ...]:
-    words: Sequence[str] = [word.strip() for word in text.split(SEPARATOR)]
-    return tuple(find_path(word, folder) for word in words if word)

@@ -178,9 +178,14 @@ class JobFolder(Generic[Order]):
     def write_order(self, order: Order) -> None:
         write_stored(self.folder / self.order_name, order)
 
+    def read_record(self) -> Any:
+        """What happened to it; None where that is damaged, or it is gone."""
+        raise NotImplementedError
+
     def has_ended(self) -> bool:
         """Whether nothing will happen to it any more: it has ended, its record is damaged, or it is gone."""
-        raise NotImplementedError
+        record = self.read_record()
+        return record is None or record.state.is_end
 
     def read_step(self) -> str | None:
         try:
@@ -227,13 +232,9 @@ class Workspace(JobFolder[Order]):
         super().__init__(folder)
         self._record = folder / "state.json"
 
+    @override
     def read_record(self) -> JobRecord | None:
         return read_stored(self._record, JobRecord)
-
-    @override
-    def has_ended(self) -> bool:
-        record = self.read_record()
-        return record is None or record.state.is_end
 
     def write_record(self, record: JobRecord) -> None:
         write_stored(self._record, record)
@@ -242,9 +243,7 @@ class Workspace(JobFolder[Order]):
     def tell_lost_end(self) -> None:
         """Tell the end of a job that ended when its events could not be written, or before there were events."""
         record = self.read_record()
-        if record is None or not record.state.is_end:
-            return
-        if not self.has_told_end():
+        if record is not None and record.state.is_end and not self.has_told_end():
             self._tell_state(record)
 
     def _tell_state(self, record: JobRecord) -> None:

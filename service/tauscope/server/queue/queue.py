@@ -122,7 +122,7 @@ class JobQueue:
         """Make the queue; jobs that an earlier service left unfinished are done again, in their order."""
         self._executor = executor
         self._slots = slots if callable(slots) else lambda: slots
-        self._is_there, self._most_waiting, self._most_each = is_there, most_waiting, most_each
+        self.can_work, self._most_waiting, self._most_each = is_there, most_waiting, most_each
         self._callers: dict[QueuedJob, str] = {}
         self._lock = threading.RLock()
         self._waiting: deque[QueuedJob] = deque()
@@ -182,9 +182,6 @@ class JobQueue:
     def waiting(self) -> int:
         return len(self._waiting)
 
-    def can_work(self) -> bool:
-        return self._is_there()
-
     def settle(self) -> None:
         """Write ends, and begin what waits. Raises OSError if a full disk is still in the way."""
         with self._lock:
@@ -217,7 +214,7 @@ class JobQueue:
             self._is_hindered = True
 
     def _fill_slots(self) -> None:
-        while (job := self._find_next()) is not None and not self._is_closed and self._is_there():
+        while (job := self._find_next()) is not None and not self._is_closed and self.can_work():
             is_wanted = job.move(JobState.RUNNING)
             self._waiting.remove(job)
             if is_wanted:  # else it is damaged, or somebody removed it by hand

@@ -13,17 +13,7 @@ from typing_extensions import override
 from tauscope.errors import ExportError, NotFoundError, RecordingError, TauscopeError
 from tauscope.export.formats import ExportFile, ExportFormat
 from tauscope.files import write_atomically
-from tauscope.server.queue.job_folder import (
-    JobFolder,
-    JobProblem,
-    Workspace,
-    begin_step,
-    do_work,
-    read_bytes,
-    read_document,
-    require_wanted,
-    without_folders,
-)
+from tauscope.server.queue import job_folder
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.store.data_folder import ItemStore
 from tauscope.server.store.files import hash_file
@@ -58,7 +48,7 @@ class TaskOrder(StrictModel):
 Order = TypeVar("Order", bound=TaskOrder)
 
 
-class TaskWorkspace(Workspace[Order]):
+class TaskWorkspace(job_folder.Workspace[Order]):
     """`outputs`: the files that a job leaves, each JSON document with its schema; `formats`: its exports."""
 
     noun: ClassVar[str]
@@ -86,7 +76,11 @@ class TaskWorkspace(Workspace[Order]):
     def read_output(self, name: str) -> bytes | None:
         """An output, or None where the file is missing, damaged or of another schema."""
         schema = self.outputs[name]
-        return read_bytes(self.folder / name) if schema is None else read_document(self.folder / name, schema)
+        return (
+            job_folder.read_bytes(self.folder / name)
+            if schema is None
+            else job_folder.read_document(self.folder / name, schema)
+        )
 
     def read_result(self) -> bytes | None:
         return self.read_output("result.json")
@@ -116,7 +110,7 @@ class TaskWorkspace(Workspace[Order]):
             try:
                 write_atomically(self.exports / file.name, outputs[file.output])
             except ExportError as error:
-                refused[export_format.value] = without_folders(str(error), *folders)
+                refused[export_format.value] = job_folder.without_folders(str(error), *folders)
         if self.formats:
             write_atomically(self.exports / "refused.json", json.dumps(refused, indent=1).encode())
 
@@ -155,15 +149,16 @@ class JobFiles(Files):
         return Path(output) if output == TRAJECTORY else None
 
 
-def perform_job(workspace: TaskWorkspace[Any], server_recordings: Path) -> JobProblem | None:
+def perform_job(kind: type[TaskWorkspace[Any]], server_recordings: Path, folder: Path) -> job_folder.JobProblem | None:
     """Do a job as a worker does; returns why there is no result, None where there is one."""
+    workspace = kind(folder)
     folders = (*map(workspace.uploads, (*workspace.roles, SAVED_MODEL)), workspace.robot, server_recordings)
 
     def tell(step: str, percent: float | None = None, figures: Mapping[str, Any] = {}) -> None:
         if percent is None:
-            begin_step(workspace, without_folders(step, *folders))
+            job_folder.begin_step(workspace, job_folder.without_folders(step, *folders))
         else:
-            require_wanted(workspace)
+            job_folder.require_wanted(workspace)
             workspace.write_progress(percent, figures)
 
     def work() -> None:
@@ -174,10 +169,10 @@ def perform_job(workspace: TaskWorkspace[Any], server_recordings: Path) -> JobPr
         tell("write result and exports")
         workspace.write_outputs(result.outputs, *folders)
 
-    return do_work(workspace, work, *folders)
+    return job_folder.do_work(workspace, work, *folders)
 
 
-Staged = TypeVar("Staged", bound=JobFolder[Any])
+Staged = TypeVar("Staged", bound=job_folder.JobFolder[Any])
 
 
 @contextmanager

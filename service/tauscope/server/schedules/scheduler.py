@@ -16,10 +16,9 @@ from tauscope.errors import NotFoundError, TauscopeError, one_line
 from tauscope.server.control.campaign import CampaignDependencies, CampaignManager, CampaignOrder, CampaignWorkspace
 from tauscope.server.control.leases import FREE, BusyError, LeasedError, Permit
 from tauscope.server.history.indexer import WORKSPACES
-from tauscope.server.queue.analyses import DiagnosisOrder, IdentificationOrder
 from tauscope.server.queue.job_folder import Workspace, without_folders
 from tauscope.server.queue.queue import QueueFullError
-from tauscope.server.queue.task_job import OrderedRecording, order_kept, stage_workspace, submit_job
+from tauscope.server.queue.task_job import OrderedRecording, TaskOrder, order_kept, stage_workspace, submit_job
 from tauscope.server.schedules.definition import RecordingChoice, ScheduleDefinition
 from tauscope.server.schedules.repository import FiringEntry, ScheduleRepository
 from tauscope.server.store.data_folder import ItemStore, utc_now
@@ -43,7 +42,7 @@ class Repeater:
 
     def start(self, entry: Schedule, since: datetime | None) -> tuple[str, str]:
         """Start it; returns kind and identifier. Raises NothingToDoError without a new recording, or TauscopeError."""
-        definition = ScheduleDefinition.model_validate(dict(entry.definition), strict=False)
+        definition = read_definition(entry)
         if definition.kind == "campaign":
             return "campaign", self._campaign(entry)
         assert definition.recordings is not None  # noqa: S101 - checked by the definition
@@ -58,9 +57,7 @@ class Repeater:
             return False
 
     def items(self, kind: str) -> ItemStore:
-        if kind == "campaign":
-            return self.campaigns.items
-        return (self.dependencies.identifications if kind == "identification" else self.dependencies.diagnoses).items
+        return self.campaigns.items if kind == "campaign" else self.dependencies.kinds[kind].items
 
     def _campaign(self, entry: Schedule) -> str:
         order = _order(entry, CampaignOrder)
@@ -70,10 +67,10 @@ class Repeater:
             return self.campaigns.submit(workspace.folder, self.permit_for(order.backend.device(order.robot_name)))
 
     def _analyse(self, kind: str, entry: Schedule, recordings: Mapping[str, tuple[OrderedRecording, ...]]) -> str:
-        is_diagnosis = kind == "diagnosis"
-        order = _order(entry, DiagnosisOrder if is_diagnosis else IdentificationOrder).model_copy(update=recordings)
-        job = self.dependencies.diagnoses if is_diagnosis else self.dependencies.identifications
-        return submit_job(self.dependencies.jobs, job, WORKSPACES[kind], order, partial(write_robot, entry=entry))
+        order_type: type[TaskOrder] = WORKSPACES[kind].order_type
+        order, jobs = _order(entry, order_type).model_copy(update=recordings), self.dependencies.jobs
+        put_robot = partial(write_robot, entry=entry)
+        return submit_job(jobs, self.dependencies.kinds[kind], WORKSPACES[kind], order, put_robot)
 
 
 def newest_recordings(

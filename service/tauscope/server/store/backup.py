@@ -18,16 +18,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from tauscope.errors import StoreError
 from tauscope.files import open_atomically, sync_folder
-from tauscope.server.store.database.database import (
-    FILE_NAME,
-    WRITES,
-    Database,
-    open_engine,
-    present_revision,
-    revisions,
-    show_address,
-    upgrade,
-)
+from tauscope.server.store.database import database as store
 
 _FORM = "alembic_version"
 
@@ -38,7 +29,7 @@ def dump_lines(engine: Engine) -> Iterator[bytes]:
     options = {"isolation_level": "REPEATABLE READ"} if engine.dialect.name == "postgresql" else {}
     with engine.connect().execution_options(**options) as connection:
         tables = _tables(connection)
-        yield _line({"revision": present_revision(connection)})
+        yield _line({"revision": store.present_revision(connection)})
         for table in tables:
             for row in connection.execute(select(table)).mappings():
                 yield _line({"table": table.name, "row": {key: _plain(value) for key, value in row.items()}})
@@ -48,21 +39,21 @@ def load_lines(engine: Engine, lines: Iterable[bytes]) -> None:
     """Fill an empty database and upgrade it. Raises StoreError if it is not empty, or the lines are newer."""
     rows = (json.loads(line) for line in lines)
     revision = next(rows)["revision"]
-    if revision not in revisions():
+    if revision not in store.revisions():
         raise StoreError(f"the backup was made by a newer Tauscope (form {revision}); restore it with that one")
     with engine.connect() as connection:
-        if present_revision(connection) is not None:
-            address = show_address(engine)
+        if store.present_revision(connection) is not None:
+            address = store.show_address(engine)
             raise StoreError(f"{address}: there is something in this database; give the backup an empty one")
-    upgrade(engine, revision)
-    with engine.execution_options(**{WRITES: True}).begin() as connection:
+    store.upgrade(engine, revision)
+    with engine.execution_options(**{store.WRITES: True}).begin() as connection:
         tables = {table.name: table for table in _tables(connection)}
         for entry in rows:
             table = tables[entry["table"]]
             values = {key: _convert_type(table.columns[key], value, connection) for key, value in entry["row"].items()}
             connection.execute(insert(table).values(**values))
         _advance_counters(connection, tables.values())
-    upgrade(engine)
+    store.upgrade(engine)
 
 
 def _tables(connection: Connection) -> list[Table]:
@@ -109,7 +100,7 @@ _STATES = ("state.json", "run.json")
 _PIECE = 2**20
 
 
-def write_backup(data_folder: Path, database: Database, target: Path, version: str) -> int:
+def write_backup(data_folder: Path, database: store.Database, target: Path, version: str) -> int:
     """The database first, then each folder's state: copies can only be newer, as after a crash. Raises OSError."""
     hashes: dict[str, dict[str, Any]] = {}
     with (
@@ -138,7 +129,7 @@ def restore_backup(source: Path, data_folder: Path, address: str | None) -> int:
         hashes = _unpack(source, staged)
         content = staged / _DATA
         content.mkdir(exist_ok=True)
-        _fill_database(staged / _DATABASE, content / FILE_NAME if address is None else address)
+        _fill_database(staged / _DATABASE, content / store.FILE_NAME if address is None else address)
         if data_folder.exists():
             data_folder.rmdir()
         content.rename(data_folder)
@@ -154,7 +145,7 @@ def _files(data_folder: Path) -> Iterator[Path]:
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         for name in sorted(names, key=lambda name: (name not in _STATES, name)):
             path = Path(root) / name
-            is_database = Path(root) == data_folder and name.startswith(FILE_NAME)
+            is_database = Path(root) == data_folder and name.startswith(store.FILE_NAME)
             if not name.startswith(".") and not is_database and not path.is_symlink() and path.is_file():
                 yield path
 
@@ -256,7 +247,7 @@ def _is_confined(name: str) -> bool:
 
 
 def _fill_database(lines: Path, address: Path | str) -> None:
-    engine = open_engine(address)
+    engine = store.open_engine(address)
     try:
         with lines.open("rb") as file:
             load_lines(engine, file)

@@ -44,9 +44,6 @@ def identifier_time(identifier: str) -> datetime:
     return datetime.strptime(identifier[:16], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
 
 
-_PIECE = 2**20
-
-
 @dataclass(frozen=True)
 class KeptFile:
     """`sha256`: of its bytes, in hexadecimal."""
@@ -102,11 +99,8 @@ def lock_file(path: Path, flags: int = 0, mode: int = 0o600) -> Iterator[int]:
 
 
 def hash_file(path: Path) -> str:
-    digest = hashlib.sha256()
     with path.open("rb") as file:
-        while piece := file.read(_PIECE):
-            digest.update(piece)
-    return digest.hexdigest()
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 Stored = TypeVar("Stored", bound=StrictModel)

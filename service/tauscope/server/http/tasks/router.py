@@ -1,52 +1,146 @@
-"""One router for every resource that performs a task: handed in, listed, followed, its outputs fetched, removed."""
+"""One router for every resource that performs a task: handed in, listed, followed by its events, ended."""
 
+import json
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from fastapi import APIRouter, Depends, Path, Request, Response
+from anyio import to_thread
+from fastapi import APIRouter, Depends, Header, Request, Response
+from fastapi.concurrency import contextmanager_in_threadpool
+from fastapi.sse import KEEPALIVE_COMMENT, EventSourceResponse, format_sse_event
 from pydantic import BaseModel, Field, create_model
 from starlette.concurrency import run_in_threadpool
 from typing_extensions import override
 
-from tauscope.errors import ExportError, NotFoundError
-from tauscope.export.formats import ExportFile, ExportFormat
+from tauscope.errors import NotFoundError
 from tauscope.robot import RobotReport
-from tauscope.robot.messages import nearest, shown
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
 from tauscope.server.control.run_manager import Manager
-from tauscope.server.http.answers import (
-    ENDINGS,
-    MOTION,
-    SUBMISSION,
-    After,
-    AnswerModel,
-    Identifier,
-    Limit,
-    PageAnswer,
-    collection,
-    require_document,
-)
+from tauscope.server.http.answers import MOTION, ROOT, SUBMISSION, After, AnswerModel, Identifier, Limit, PageAnswer
+from tauscope.server.http.bodies import PartRule
 from tauscope.server.http.leases import NO_BODY, LeaseToken
-from tauscope.server.http.openapi import Examples, file_contents
+from tauscope.server.http.openapi import Examples, refer_to_model
 from tauscope.server.http.reading import READING
-from tauscope.server.http.services import Services, ServicesDep, require_no_model
-from tauscope.server.http.tasks.event_feeds import EventSource
-from tauscope.server.http.tasks.events import add_events_route
-from tauscope.server.http.tasks.submission import RobotRequest, request_body
+from tauscope.server.http.services import Services, ServicesDep
+from tauscope.server.http.settings import Settings
+from tauscope.server.http.tasks import submission
+from tauscope.server.http.tasks.event_feeds import EventFeeds, EventSource
 from tauscope.server.problems import ProblemError, problem_responses
-from tauscope.server.queue.job_folder import JobFolder
-from tauscope.server.queue.queue import JobKind
-from tauscope.server.queue.received_files import check_received_robot
-from tauscope.server.store.data_folder import ItemStore
+from tauscope.server.queue.job_folder import EndedEvent, JobFolder, ProgressEvent, StateEvent, StepEvent
+from tauscope.server.queue.received_files import check_received_robot, read_received_robot
+from tauscope.server.queue.task_job import stage_workspace
+from tauscope.server.store.event_log import LoggedEvent
 
-HTML = "text/html"
-PAGE_HEADERS = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; sandbox"}
-"""A report brings its style with it, runs no script, and may do nothing in the name of whoever reads it."""
+EVENT_MODELS = (StateEvent, StepEvent, ProgressEvent, EndedEvent)
+HEARTBEAT_S = 10.0  # silence after which a comment says that the connection lives [s]
+RETRY_MS = 1000  # how long a client waits before it connects again [ms]
+PRESENCE_S = 1.0  # how often a client without news is looked for [s]
+
+
+LastEvent = Annotated[
+    int,
+    Header(
+        alias="Last-Event-ID",
+        ge=0,
+        le=2**53,
+        description="id of the last event that is known; the answer begins with the next",
+    ),
+]
+
+
+_STREAM = """\
+Kinds: `state`, `step`, `progress` and `ended`, after which the stream ends. An event's id is its number:
+`Last-Event-ID` goes on after it, also after a restart of the service. Comments keep a quiet connection alive."""
+
+
+def add_events_route(router: APIRouter, noun: str, find: Callable[[Services, str], EventSource]) -> None:
+    """Give a collection of jobs the route ``/{identifier}/events``."""
+
+    def find_source(identifier: Identifier, services: ServicesDep) -> EventSource:
+        return find(services, identifier)
+
+    @router.get(
+        "/{identifier}/events",
+        name=f"follow_events_of_{router.prefix.strip('/')}",
+        summary=f"Follow the events of {noun}",
+        response_class=Response,
+        responses={
+            200: {"content": {"text/event-stream": {"schema": _stream_schema()}}, "description": _STREAM},
+            204: {"description": "the job had ended before `Last-Event-ID`: do not connect again"},
+            **problem_responses("not-found"),
+        },
+    )
+    async def follow_events(
+        request: Request,
+        services: ServicesDep,
+        source: Annotated[EventSource, Depends(find_source)],
+        after: LastEvent = 0,
+    ) -> Response:
+        """Server-sent events, from the first one on."""
+        first = await to_thread.run_sync(_find_end, source, limiter=services.followers)
+        if first is not None and after >= first:
+            return Response(status_code=204)
+        stream = _stream(request, services.feeds, source, after)
+        return EventSourceResponse(stream, headers={"X-Accel-Buffering": "no"})
+
+
+async def _stream(request: Request, feeds: EventFeeds, source: EventSource, after: int) -> AsyncIterator[bytes]:
+    """Everything that happens, as it is sent; ends with the job, the client or the service."""
+    yield format_sse_event(retry=RETRY_MS)
+    place, quiet_s = 0, 0.0
+    with feeds.follow(source) as feed:
+        while not await request.is_disconnected():
+            events, place = feed.events[place:], len(feed.events)
+            new = [event for event in events if event.number > after]
+            if new:
+                yield b"".join(map(_format_event, new))
+                quiet_s = 0.0
+            if feed.is_over and place == len(feed.events):
+                return
+            if place == len(feed.events) and not await feed.wait(PRESENCE_S):
+                quiet_s += PRESENCE_S
+            if quiet_s > HEARTBEAT_S:
+                yield KEEPALIVE_COMMENT
+                quiet_s = 0.0
+
+
+def _find_end(source: EventSource) -> int | None:
+    """Number of the end event; None where there is none yet."""
+    if not source.has_ended():
+        return None
+    events = source.events.follow().read()
+    return next((event.number for event in events if event.content.get("kind") == "ended"), None)
+
+
+def _format_event(event: LoggedEvent) -> bytes:
+    kind = event.content.get("kind")
+    return format_sse_event(
+        data_str=json.dumps(event.content, ensure_ascii=False),
+        event=kind if isinstance(kind, str) else None,
+        id=str(event.number),
+    )
+
+
+def _stream_schema() -> dict[str, Any]:
+    return {
+        "type": "object",
+        "additionalProperties": False,
+        "properties": {
+            "event": {"type": "string", "enum": ["state", "step", "progress", "ended"]},
+            "id": {"type": "string", "description": "number of the event, from 1"},
+            "data": {
+                "type": "string",
+                "contentMediaType": "application/json",
+                "contentSchema": {"anyOf": [refer_to_model(model) for model in EVENT_MODELS]},
+            },
+            "retry": {"type": "integer", "description": "how long to wait before connecting again [ms]"},
+        },
+    }
 
 
 class RobotFileAnswer(AnswerModel):
@@ -60,49 +154,14 @@ class JobRobotAnswer(AnswerModel):
     files: list[RobotFileAnswer] = Field(description="robot file and URDF as they were sent")
 
 
-@dataclass(frozen=True)
-class JobDocument:
-    """`output`: its name among the outputs; `missing`: what is said where the task may make none, and made none."""
-
-    name: str
-    output: str
-    summary: str
-    description: str
-    answer: dict[str, Any]
-    media_type: str = "application/json"
-    missing: str | None = None
-
-
-def text_document(name: str, output: str, media_type: str, summary: str, words: str, same: str) -> JobDocument:
-    """A document that is no JSON; `same` is the option that writes the same file."""
-    answer = {"content": file_contents(media_type), "description": f"the same {same}"}
-    missing = None if media_type == HTML else f"no {name} is kept here; hand it in again"
-    return JobDocument(name, output, summary, words, answer, media_type, missing)
-
-
-def result_document(noun: str, verb: str, model: type[BaseModel]) -> JobDocument:
-    answer = {"model": model, "description": f"the same document as `tauscope {verb} --json`"}
-    words = f"The result of {noun} that succeeded; else the problem that it ended in."
-    return JobDocument("result", "result.json", "Fetch the result", words, answer)
-
-
-def report_document(verb: str) -> JobDocument:
-    text = "The report as one page: no script, no request to anywhere, ready to print."
-    return text_document("report", "report.html", HTML, "Fetch the report", text, f"page as `tauscope {verb} --report`")
-
-
-def plots_document(noun: str, model: type[BaseModel], words: str) -> JobDocument:
-    answer, summary = {"model": model, "description": words}, "Fetch the data of its figures"
-    return JobDocument("plots", "plots.json", summary, f"What figures of {noun} are drawn from.", answer)
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Resource(ABC):
     """What is special about a resource; `words`: of handing in; `parts`: files of a form beside the robot's."""
 
     noun: str
     plural: str
-    models: tuple[type[RobotRequest], type[BaseModel]]
+    models: tuple[type[submission.RobotRequest], type[BaseModel]]
+    workspace: type[Any]
     examples: Examples
     summary: str
     words: str
@@ -114,24 +173,43 @@ class Resource(ABC):
     def singular(self) -> str:
         return self.noun.rpartition(" ")[2]
 
-    @abstractmethod
-    def items(self, services: Services) -> ItemStore: ...
+    def path(self, identifier: str) -> str:
+        return f"{ROOT}/{self.plural}/{identifier}"
 
-    @abstractmethod
     def find(self, services: Services, identifier: str) -> Any:
         """The folder of an item. Raises NotFoundError if there is none."""
+        return self.workspace(services.items[self.singular].folder(identifier))
 
     def follow(self, services: Services, identifier: str) -> EventSource:
         """What has the events of an item. Raises NotFoundError if there is none."""
         return self.find(services, identifier)
 
-    @abstractmethod
     async def submit(self, request: Request, services: Services) -> str:
         """Take a request; returns an identifier. Raises ProblemError or TauscopeError if it is not valid."""
+        settings, staged = services.settings, stage_workspace(services.items[self.singular], self.workspace)
+        async with contextmanager_in_threadpool(staged) as workspace:
+            rules = self.part_rules(settings, workspace)
+            received = await submission.receive_request(request, self.models[0], settings, workspace.robot, rules)
+            robot_file = await run_in_threadpool(self.put_robot, received, services, workspace)
+            robot = await services.reading.call(request, read_received_robot, workspace.robot, robot_file)
+            return await self.hand_over(
+                submission.Submission(received.document, received.form, request, services, workspace, robot_file, robot)
+            )
+
+    def part_rules(self, _settings: Settings, _workspace: Any) -> dict[str, PartRule]:
+        """The files that a form may bring beside the robot's, by part."""
+        return {}
+
+    def put_robot(self, received: submission.Received[Any], services: Services, workspace: Any) -> str:
+        """Put the robot into its folder; returns the name of its file."""
+        return submission.keep_robot(received, workspace.robot, services.robots)
 
     @abstractmethod
-    def describe(self, services: Services, identifier: str, root: str) -> Any:
-        """The answer; one whose files are damaged says so. Raises NotFoundError. `root`: path of the interface."""
+    async def hand_over(self, handed: submission.Submission[Any]) -> str: ...
+
+    @abstractmethod
+    def describe(self, services: Services, identifier: str) -> Any:
+        """The answer; one whose files are damaged says so. Raises NotFoundError."""
 
     def router(self) -> APIRouter:
         router = APIRouter(prefix=f"/{self.plural}", tags=[self.plural])
@@ -153,12 +231,12 @@ def _add_submission(router: APIRouter, resource: Resource) -> None:
         description=resource.words,
         response_model=answer_model,
         responses=problem_responses(*SUBMISSION, *resource.motion_problems, *resource.problems),
-        openapi_extra=request_body(request_model, resource.examples, resource.parts),
+        openapi_extra=submission.request_body(request_model, resource.examples, resource.parts),
         dependencies=[Depends(_lease_header)] if resource.motion_problems else [],
     )
     async def hand_in(request: Request, response: Response, services: ServicesDep) -> Any:
         identifier = await resource.submit(request, services)
-        answer = await run_in_threadpool(resource.describe, services, identifier, collection(request, 1))
+        answer = await run_in_threadpool(resource.describe, services, identifier)
         response.headers["Location"] = answer.links.self_
         return answer
 
@@ -174,14 +252,14 @@ def _add_list(router: APIRouter, resource: Resource) -> None:
     )
 
     @router.get("", name=f"list_{plural}", summary=f"List {plural}", response_model=list_model)
-    def list_items(request: Request, services: ServicesDep, limit: Limit = 100, after: After = None) -> BaseModel:
+    def list_items(services: ServicesDep, limit: Limit = 100, after: After = None) -> BaseModel:
         """The newest first."""
-        root, found = collection(request, 1), resource.items(services).identifiers()
-        found = [each for each in found if after is None or each < after]
+        known = services.items[resource.singular].identifiers()
+        found = [each for each in known if after is None or each < after]
         page = []
         for each in found[:limit]:
             with suppress(NotFoundError):  # it was removed a moment ago
-                page.append(resource.describe(services, each, root))
+                page.append(resource.describe(services, each))
         return list_model(**{plural: page}, next=found[limit - 1] if len(found) > limit else None)
 
 
@@ -193,9 +271,9 @@ def _add_item(router: APIRouter, resource: Resource) -> None:
         response_model=resource.models[1],
         responses=problem_responses("not-found"),
     )
-    def get_item(request: Request, identifier: Identifier, services: ServicesDep) -> Any:
+    def get_item(identifier: Identifier, services: ServicesDep) -> Any:
         """Its state, and where to go on from there."""
-        return resource.describe(services, identifier, collection(request, 2))
+        return resource.describe(services, identifier)
 
     @router.get(
         "/{identifier}/robot",
@@ -212,52 +290,20 @@ def _add_item(router: APIRouter, resource: Resource) -> None:
         return await describe_robot(request, services, workspace.robot, order.robot_file)
 
 
-def add_cancelling(router: APIRouter, resource: Resource, kind: Callable[[Services], JobKind]) -> None:
-    """Give a resource of queued jobs the route ``DELETE /{identifier}``."""
-
-    @router.delete(
-        "/{identifier}",
-        name=f"cancel_or_remove_{resource.singular}",
-        summary=f"Cancel or remove {resource.noun}",
-        response_model=resource.models[1],
-        responses={204: {"description": "it had ended, and was removed"}, **problem_responses("not-found", "in-use")},
-    )
-    def cancel_or_remove(request: Request, identifier: Identifier, services: ServicesDep) -> Any:
-        """One that waits or runs is cancelled; one that has ended is removed, unless it is a model in use."""
-        if resource.find(services, identifier).has_ended():
-            require_no_model(services, identifier)
-        if services.jobs.cancel_or_remove(kind(services), identifier):
-            return Response(status_code=204)
-        return resource.describe(services, identifier, collection(request, 2))
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MovingResource(Resource):
     """One that moves an arm; `stop_words` and `remove_words` describe the routes that end it."""
 
+    manager: Callable[[Services], Manager[Any]]
     stop_model: type[BaseModel]
     stop_words: str
     remove_words: str
     motion_problems: ClassVar[Sequence[str]] = MOTION
 
-    @abstractmethod
-    def manager(self, services: Services) -> Manager[Any]: ...
-
-    @abstractmethod
-    def read_state(self, services: Services, identifier: str) -> Any:
-        """The state in its folder; None where that is damaged."""
-
-    @override
-    def items(self, services: Services) -> ItemStore:
-        return self.manager(services).items
-
     @override
     def router(self) -> APIRouter:
         router = super().router()
-        self._add_ending(router)
-        return router
 
-    def _add_ending(self, router: APIRouter) -> None:
         @router.post(
             "/{identifier}/stop",
             name=f"stop_{self.singular}",
@@ -270,9 +316,12 @@ class MovingResource(Resource):
         )
         async def stop_item(identifier: Identifier, services: ServicesDep) -> BaseModel:
             # Neither a thread of the pool nor a lock nor a disk is needed for one that goes on, whatever is stuck.
-            state = self.manager(services).stop(identifier) or self.read_state(services, identifier)
+            state = self.manager(services).stop(identifier)
             if state is None:
-                raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it does not go on")
+                record = self.find(services, identifier).read_record()
+                if record is None:
+                    raise ProblemError("damaged", f"files of {identifier} are missing or damaged; it does not go on")
+                state = record.state
             return self.stop_model(id=identifier, state=state)
 
         @router.delete(
@@ -287,69 +336,10 @@ class MovingResource(Resource):
             if not self.manager(services).remove(identifier):
                 raise ProblemError("not-finished", f"{identifier} goes on; stop it, and remove it when it has ended")
 
-
-Finished = Callable[[Services, str], Any]  # the folder of a job that succeeded
-
-
-def add_document_route(router: APIRouter, finished: Finished, document: JobDocument, problems: Sequence[str]) -> None:
-    @router.get(
-        f"/{{identifier}}/{document.name}",
-        name=f"get_{document.name.replace('-', '_')}_of_{router.prefix.strip('/')}",
-        summary=document.summary,
-        description=document.description,
-        response_class=Response,
-        responses={
-            200: document.answer,
-            **problem_responses("not-found", *ENDINGS, *problems, "worker-lost", "internal"),
-        },
-    )
-    def get_document(identifier: Identifier, services: ServicesDep) -> Response:
-        content = finished(services, identifier).read_output(document.output)
-        if content is None and document.missing is not None:
-            raise NotFoundError(document.missing)
-        headers = PAGE_HEADERS if document.media_type == HTML else None
-        return Response(require_document(content, identifier), headers=headers, media_type=document.media_type)
+        return router
 
 
-def add_export_route(
-    router: APIRouter, finished: Finished, formats: Mapping[ExportFormat, ExportFile], words: str
-) -> None:
-    """Give a resource the route ``/{identifier}/exports/{format}``."""
-    content = file_contents(*{file.media_type for file in formats.values()})
-    schema = {"enum": [kind.value for kind in formats]}
-
-    @router.get(
-        "/{identifier}/exports/{format}",
-        name=f"get_export_of_{router.prefix.strip('/')}",
-        summary="Fetch an export",
-        description=words,
-        response_class=Response,
-        responses={
-            200: {"content": content, "description": "the file"},
-            **problem_responses(
-                "not-found", *ENDINGS, "export", "recording", "identification", "worker-lost", "internal"
-            ),
-        },
-    )
-    def get_export(
-        identifier: Identifier,
-        format_: Annotated[
-            str, Path(alias="format", description="what to write", json_schema_extra=schema, examples=["c"])
-        ],
-        services: ServicesDep,
-    ) -> Response:
-        if format_ not in formats:
-            raise NotFoundError(f"there is no export {shown(format_)}; {nearest(format_, set(formats))}")
-        workspace = finished(services, identifier)
-        reason = workspace.refused_exports().get(format_)
-        if reason is not None:
-            raise ExportError(reason)
-        file = formats[ExportFormat(format_)]
-        disposition = {"Content-Disposition": f'attachment; filename="{file.name}"'}
-        return Response(workspace.read_export(file.name), headers=disposition, media_type=file.media_type)
-
-
-async def describe_robot(request: Request, services: Services, folder: FilePath, robot_file: str) -> JobRobotAnswer:
+async def describe_robot(request: Request, services: Services, folder: Path, robot_file: str) -> JobRobotAnswer:
     report = await services.reading.call(request, check_received_robot, folder, robot_file)
     files = await run_in_threadpool(_read_files, folder)
     return JobRobotAnswer(report=report, robot_file=robot_file, files=files)
@@ -359,7 +349,7 @@ def _lease_header(_lease: LeaseToken = None) -> None:
     """The lease that a request comes with; `permit_of` reads it."""
 
 
-def _read_files(folder: FilePath) -> list[RobotFileAnswer]:
+def _read_files(folder: Path) -> list[RobotFileAnswer]:
     answers = []
     for path in sorted(folder.iterdir()):
         if path.is_file() and not path.is_symlink():

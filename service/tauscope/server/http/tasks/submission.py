@@ -1,7 +1,7 @@
 """A request that hands a job in: JSON, or a form with the JSON as part `request` and files beside it."""
 
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
@@ -11,30 +11,19 @@ from fastapi import Request
 from pydantic import AfterValidator, Field, FiniteFloat, model_validator
 from pydantic_core import PydanticCustomError
 
-from tauscope.errors import IdentificationError, RobotFileError, ScenarioError
+from tauscope.errors import RobotFileError, ScenarioError
 from tauscope.robot import Robot
 from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
 from tauscope.robot.xml_text import LARGEST_XML
 from tauscope.runtime.drivers import BackendName, find_driver
-from tauscope.server.http.answers import AnswerModel
-from tauscope.server.http.bodies import (
-    FORM,
-    JSON,
-    PartRule,
-    ReceivedForm,
-    media_type,
-    parse_document,
-    read_document,
-    receive_form,
-    refuse_media_type,
-    to_json_text,
-)
+from tauscope.server.http import bodies
+from tauscope.server.http.answers import ROOT, AnswerModel
 from tauscope.server.http.openapi import ROBOT_PARTS, Examples, form_body, json_body, refer_to_model
+from tauscope.server.http.services import Services
 from tauscope.server.http.settings import Settings
 from tauscope.server.problems import ProblemError
 from tauscope.server.queue.received_files import INLINE_NAME
-from tauscope.server.queue.task_job import SAVED_MODEL, TaskWorkspace
-from tauscope.server.store.files import FILE_NAME_PATTERN, FILE_NAME_RULE, KeptFile, is_file_name
+from tauscope.server.store.files import FILE_NAME_PATTERN, FILE_NAME_RULE, is_file_name
 from tauscope.server.store.robots import RobotStore, RobotVersion
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.run import BackendChoice
@@ -73,43 +62,24 @@ class RobotVersionAnswer(AnswerModel):
 
     @classmethod
     def of(cls, robot: RobotVersion) -> "RobotVersionAnswer":
-        return cls(**asdict(robot), link=f"/api/v1/robots/versions/{robot.version}")
+        return cls(**asdict(robot), link=f"{ROOT}/robots/versions/{robot.version}")
 
 
-def robot_part_rules(folder: Path) -> dict[str, PartRule]:
+def robot_part_rules(folder: Path) -> dict[str, bodies.PartRule]:
     return {
-        "robot": PartRule(LARGEST_ROBOT_FILE, folder, default_name="robot.yaml"),
-        "urdf": PartRule(LARGEST_XML, folder),
+        "robot": bodies.PartRule(LARGEST_ROBOT_FILE, folder, default_name="robot.yaml"),
+        "urdf": bodies.PartRule(LARGEST_XML, folder),
     }
 
 
 def keep_inline_robot(folder: Path, robot: Mapping[str, Any]) -> str:
     """Write a robot that came as JSON. Raises RobotFileError if it is not plain data, or too large."""
-    text = to_json_text(robot, "robot", RobotFileError)
+    text = bodies.to_json_text(robot, "robot", RobotFileError)
     (folder / INLINE_NAME).write_text(text, encoding="utf-8")
     return INLINE_NAME
 
 
 MODEL_FILE = "model.json"
-
-
-def keep_model(
-    model: str | dict[str, Any] | None,
-    file: KeptFile | None,
-    workspace: TaskWorkspace[Any],
-    read: Callable[[str], bytes],
-) -> str | None:
-    """Put a model, or that of an identifier, into its place; its name. Raises ProblemError, IdentificationError."""
-    if file is not None and model is not None:
-        raise ProblemError("invalid-request", "the model came twice, as part model and in part request; send it once")
-    if file is not None or model is None:
-        return None if file is None else file.name
-    path: Path = workspace.uploads(SAVED_MODEL) / MODEL_FILE
-    if isinstance(model, str):
-        path.write_bytes(read(model))
-        return MODEL_FILE
-    path.write_text(to_json_text(model, "model", IdentificationError), encoding="utf-8")
-    return MODEL_FILE
 
 
 class RobotRequest(StrictModel):
@@ -144,17 +114,29 @@ class RecordingsRequest(RobotRequest):
         return self
 
 
-RECORDINGS_EXAMPLE: tuple[str, Any] = (
-    "Recordings that lie on the server",
-    {"robot": EXAMPLE_ROBOT, "recordings": ["monday.csv", "tuesday.csv"], "held_out": ["wednesday.mcap"]},
-)
 Document = TypeVar("Document", bound=RobotRequest)
 
 
 @dataclass(frozen=True)
 class Received(Generic[Document]):
     document: Document
-    form: ReceivedForm
+    form: bodies.ReceivedForm
+
+
+@dataclass(frozen=True)
+class Submission(Received[Document]):
+    """What was handed in; `workspace` is the staged folder that its files lie in, the robot's among them."""
+
+    request: Request
+    services: Services
+    workspace: Any
+    robot_file: str
+    robot: Robot
+
+    @property
+    def robot_fields(self) -> dict[str, Any]:
+        """What every order says of its robot."""
+        return {"robot_file": self.robot_file, "robot_name": self.robot.name}
 
 
 async def receive_request(
@@ -162,20 +144,20 @@ async def receive_request(
     kind: type[Document],
     settings: Settings,
     robot_folder: Path,
-    further_parts: Mapping[str, PartRule] | None = None,
+    further_parts: Mapping[str, bodies.PartRule] | None = None,
 ) -> Received[Document]:
     """Read JSON or a form. Raises ProblemError or LimitExceededError."""
-    if media_type(request) == JSON:
-        return Received(await read_document(request, kind, settings.max_document_bytes), ReceivedForm())
-    if media_type(request) != FORM:
-        raise refuse_media_type(request, JSON, FORM)
+    if bodies.media_type(request) == bodies.JSON:
+        return Received(await bodies.read_document(request, kind, settings.max_document_bytes), bodies.ReceivedForm())
+    if bodies.media_type(request) != bodies.FORM:
+        raise bodies.refuse_media_type(request, bodies.JSON, bodies.FORM)
     rules = {
-        "request": PartRule(settings.max_document_bytes),
+        "request": bodies.PartRule(settings.max_document_bytes),
         **robot_part_rules(robot_folder),
         **(further_parts or {}),
     }
-    form = await receive_form(request, rules)
-    return Received(parse_document(form.texts.get("request", b"{}"), kind, within="part request"), form)
+    form = await bodies.receive_form(request, rules)
+    return Received(bodies.parse_document(form.texts.get("request", b"{}"), kind, within="part request"), form)
 
 
 def keep_robot(received: Received[Any], folder: Path, robots: RobotStore) -> str:
@@ -226,7 +208,7 @@ class BackendRequest(StrictModel):
 def choose_backend(settings: Settings, request: BackendRequest, robot: Robot) -> BackendChoice:
     """Raises ScenarioError, or RobotFileError if a drive names a file or a simulated arm has no model."""
     if request.scenario is not None:
-        to_json_text(request.scenario, "scenario", ScenarioError)
+        bodies.to_json_text(request.scenario, "scenario", ScenarioError)
     name = request.name or settings.backend
     driver = find_driver(name)
     _refuse_files(robot, driver.file_keys)

@@ -67,9 +67,21 @@ export async function post(path, body, options = {}) {
   return response.status === 204 ? null : response.json();
 }
 
-export async function remove(path, options = {}) {
-  await fetchRaw(path, { ...options, method: "DELETE" });
+export const remove = (path, options = {}) => fetchRaw(path, { ...options, method: "DELETE" });
+
+/** A form: the request as JSON, where there is one, and files under the names of their parts. */
+export function formOf(request, files) {
+  const form = new FormData();
+  if (request) form.append("request", new Blob([JSON.stringify(request)], { type: "application/json" }));
+  for (const [part, file] of files) if (file) form.append(part, file, file.name);
+  return form;
 }
+
+/** The robot of an item at a glance; null where there is none to be had. */
+export const reportOf = (path, signal) => getJson(`${path}/robot`, signal).then((robot) => robot.report, () => null);
+
+/** A parameter behind the hash. */
+export const query = (name) => new URLSearchParams(location.hash.split("?")[1] ?? "").get(name);
 
 /** Save a file that the service sends; a link alone could bring no key. */
 export async function download(path, name) {

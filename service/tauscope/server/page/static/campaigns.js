@@ -1,8 +1,8 @@
 // Campaigns: begun from a robot file, followed step by step, and read.
 
-import { ENDS, fetchRaw, follow, getJson, post } from "./api.js";
-import { cautions, explained, h, moment, render, section, state, title, verdict } from "./dom.js";
-import { HEADLINES, appendRobot } from "./diagnoses.js";
+import { ENDS, fetchRaw, follow, formOf, getJson, post, query, reportOf } from "./api.js";
+import { attempt, cautions, explained, h, moment, render, section, state, title, verdict } from "./dom.js";
+import { HEADLINES, robotFiles } from "./diagnoses.js";
 import { DRIVERS } from "./drivers.js";
 import { move } from "./leases.js";
 import { figuresOf, outcome, searchable } from "./lists.js";
@@ -25,7 +25,7 @@ export async function showCampaigns(root, { signal }) {
 
 export async function showCampaign(root, { id, signal, show }) {
   // All that is there already comes first: what is put in later would push away what is being read.
-  const [begun, report] = await Promise.all([getJson(`campaigns/${id}`, signal), getJson(`campaigns/${id}/robot`, signal).then((robot) => robot.report, () => null)]);
+  const [begun, report] = await Promise.all([getJson(`campaigns/${id}`, signal), reportOf(`campaigns/${id}`, signal)]);
   let campaign = begun;
   const result = campaign.state === "succeeded" ? await getJson(campaign.links.result, signal) : null;
   const steps = h("ol", { class: "steps" });
@@ -106,7 +106,7 @@ const TIMES = { virtual: "as fast as it computes", real: "by the clock" };
 const choice = (id, words) => h("select", { id }, Object.entries(words).map(([value, text]) => h("option", { value, text })));
 
 export async function showNewCampaign(root, { signal }) {
-  const again = new URLSearchParams(location.hash.split("?")[1] ?? "").get("robot");
+  const again = query("robot");
   const chosen = { files: null, report: null };
   const sheet = h("div", {});
   const said = h("p", { role: "status", class: "note" });
@@ -119,23 +119,18 @@ export async function showNewCampaign(root, { signal }) {
   async function take(files) {
     const robot = files.find((file) => /\.(ya?ml|json)$/i.test(file.name)) ?? files[0];
     const urdf = files.find((file) => file !== robot);
-    const form = new FormData();
-    form.append("robot", robot);
-    if (urdf) form.append("urdf", urdf);
     said.textContent = "Checking …";
     begin.disabled = true;
-    try {
-      const report = await post("robots/check", form);
+    const isUsable = await attempt(said, async () => {
+      const report = await post("robots/check", formOf(null, [["robot", robot], ["urdf", urdf]]));
       chosen.files = [robot, urdf];
       chosen.report = report;
       said.textContent = "";
       render(sheet, h("h2", { text: report.name }), robotSheet(report), cautions(report.findings));
       await offerModel();
       render(joints, ...report.joints.map((joint) => h("option", { value: joint.number, text: joint.name })));
-    } catch (error) {
-      render(sheet);
-      render(said, explained(error));
-    }
+    });
+    if (!isUsable) render(sheet);
   }
 
   /** A simulated arm needs a model: say so before anything begins, and offer the last one that was found. */
@@ -150,13 +145,11 @@ export async function showNewCampaign(root, { signal }) {
       last ? h("p", {}, h("button", { type: "button", text: `Use the model of its diagnosis of ${moment(last.created)}`, onclick: () => useModelOf(last.id) })) : null);
   }
 
-  async function useModelOf(id) {
-    try {
-      const [text, robot] = await Promise.all([fetchRaw(`diagnoses/${id}/improved-robot`).then((answer) => answer.text()), getJson(`diagnoses/${id}/robot`)]);
-      const beside = robot.files.filter((file) => file.name !== robot.robot_file).map((file) => new File([file.content], file.name));
-      await take([new File([text], "improved-robot.yaml"), ...beside]);
-    } catch (error) { render(said, explained(error)); }
-  }
+  const useModelOf = (id) => attempt(said, async () => {
+    const [text, robot] = await Promise.all([fetchRaw(`diagnoses/${id}/improved-robot`).then((answer) => answer.text()), getJson(`diagnoses/${id}/robot`)]);
+    const beside = robot.files.filter((file) => file.name !== robot.robot_file).map((file) => new File([file.content], file.name));
+    await take([new File([text], "improved-robot.yaml"), ...beside]);
+  });
 
   const lacking = h("div", { class: "lacking", role: "status" });
   const backend = choice("backend", BACKENDS);
@@ -183,23 +176,17 @@ export async function showNewCampaign(root, { signal }) {
     const concealed = isSim ? CONCEALED[conceal.value](Number(joints.value)) : null;
     const request = { backend: { name: backend.value, ...(isSim ? { time: time.value } : {}), ...(concealed ? { scenario: { torque_noise_std: 0.1, seed: 1, effects: [concealed] } } : {}) }, diagnosis: { next_trajectory: plan.checked }, ...LENGTHS[length.value] };
     if (isSim) request.run = { feed_forward: false, rate_hz: 200 };
-    const body = new FormData();
-    body.append("request", new Blob([JSON.stringify(request)], { type: "application/json" }));
-    body.append("robot", chosen.files[0]);
-    if (chosen.files[1]) body.append("urdf", chosen.files[1]);
-    try {
+    const body = formOf(request, [["robot", chosen.files[0]], ["urdf", chosen.files[1]]]);
+    begin.disabled = await attempt(said, async () => {
       const campaign = await move("campaigns", body, chosen.report.name, backend.value);
       location.hash = `#/campaigns/${campaign.id}`;
-    } catch (error) { render(said, explained(error)); begin.disabled = false; }
+    });
   } },
   h("label", { for: "backend" }, "Arm", backend), h("label", { for: "length" }, "Motion", length), h("label", { for: "time" }, "Time of the simulated arm", time),
   h("label", { for: "conceal" }, "The simulated arm conceals", conceal), h("label", { for: "conceal-joint" }, "at joint", joints),
   h("label", { class: "check", for: "plan" }, plan, "Plan a further motion even where the diagnosis leaves nothing open."), clearLabel, h("div", { class: "row" }, begin));
   if (ROBOT_OF.test(again)) {
-    const robot = await getJson(`${again}/robot`, signal);
-    const parts = new FormData();
-    appendRobot(parts, robot);
-    await take([parts.get("robot"), parts.get("urdf")].filter(Boolean));
+    await take(robotFiles(await getJson(`${again}/robot`, signal)).map(([, file]) => file));
   }
   render(root, h("h1", { text: "New campaign" }), h("p", { class: "lead", text: "A motion is designed, driven twice, and the arm identified and diagnosed. Stop, above, ends it at any moment." }), drop, said, sheet, lacking, form);
 }

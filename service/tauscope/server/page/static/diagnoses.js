@@ -1,7 +1,7 @@
 // A diagnosis as a story: where, what, how much, the proof, what next.
 
-import { download, getJson, post } from "./api.js";
-import { chance, explained, figures, h, moment, named, number, parameterName, percent, render, s, section, table, tabs, title, unit, unitsOf, verdict, withError } from "./dom.js";
+import { download, formOf, getJson, post, query, reportOf } from "./api.js";
+import { attempt, chance, figures, h, moment, named, number, parameterName, percent, render, s, section, table, tabs, title, unit, unitsOf, verdict, withError } from "./dom.js";
 import { VARIABLES, heatMap } from "./heat.js";
 import { waiting } from "./identifications.js";
 import { move } from "./leases.js";
@@ -33,8 +33,8 @@ export async function showDiagnosis(root, { id, signal, show }) {
   const meta = h("p", { class: "meta", text: `${moment(job.created)} · ${of}` });
   const head = [eyebrow, h("h1", { text: job.robot ?? id }), meta];
   if (job.state !== "succeeded") return waiting(root, head, job, signal, show);
-  const [result, plots, report] = await Promise.all([getJson(job.links.result, signal), getJson(job.links.plots, signal), getJson(`diagnoses/${id}/robot`, signal).then((robot) => robot.report, () => null)]);
-  const earlier = new URLSearchParams(location.hash.split("?")[1] ?? "").get("before");
+  const [result, plots, report] = await Promise.all([getJson(job.links.result, signal), getJson(job.links.plots, signal), reportOf(`diagnoses/${id}`, signal)]);
+  const earlier = query("before");
   const previous = earlier && (await getJson(`diagnoses/${encodeURIComponent(earlier)}/result`, signal).catch(() => null));
   const fit = result.fit.held_out ?? result.fit.train;
   const ratio = (values) => values.map((rms, place) => rms / result.noise_std[place]);
@@ -144,11 +144,8 @@ function changeList(before, result) {
 export async function diagnoseAgain(id, recording) {
   const [job, robot] = await Promise.all([getJson(`diagnoses/${encodeURIComponent(id)}`), getJson(`diagnoses/${encodeURIComponent(id)}/robot`)]);
   const kept = (role) => job[role].filter((each) => each.origin === "server").map((each) => each.name);
-  const form = new FormData();
   const request = { recordings: [...kept("recordings"), recording], held_out: kept("held_out"), options: { ...job.options, next_trajectory: false } };
-  form.append("request", new Blob([JSON.stringify(request)], { type: "application/json" }));
-  appendRobot(form, robot);
-  return post("diagnoses", form);
+  return post("diagnoses", formOf(request, robotFiles(robot)));
 }
 
 function findingsSection(result) {
@@ -246,10 +243,10 @@ function nextSection(job, result, signal) {
   const isRepeatable = ["identified", "model"].includes(job.options.against) && [...job.recordings, ...job.held_out].every((each) => each.origin === "server");
   const button = h("button", { type: "button", class: "primary", text: isRepeatable ? "Run it on the simulated arm, and diagnose again" : "Run it on the simulated arm", onclick: async () => {
     button.disabled = true;
-    try {
+    button.disabled = await attempt(said, async () => {
       const run = await move("runs", await nextRun(job), job.robot, "sim");
       location.hash = `#/runs/${run.id}${isRepeatable ? `?after=${job.id}` : ""}`;
-    } catch (error) { render(said, explained(error)); button.disabled = false; }
+    });
   } });
   if (job.links.next_trajectory) {
     getJson(job.links.next_trajectory, signal).then((trajectory) => render(place, h("p", { class: "note", text: `Planned: ${(trajectory.segments ?? []).length} segments, within the robot file's limits.` }))).catch(() => {});
@@ -271,15 +268,12 @@ async function sameArm(job) {
 
 async function nextRun(job) {
   const [robot, trajectory, arm] = await Promise.all([getJson(`diagnoses/${job.id}/robot`), getJson(job.links.next_trajectory), sameArm(job)]);
-  const form = new FormData();
-  form.append("request", new Blob([JSON.stringify({ ...arm, trajectory })], { type: "application/json" }));
-  appendRobot(form, robot);
-  return form;
+  return formOf({ ...arm, trajectory }, robotFiles(robot));
 }
 
-export function appendRobot(form, robot) {
-  for (const file of robot.files) form.append(file.name === robot.robot_file ? "robot" : "urdf", new File([file.content], file.name));
-}
+/** The files of a robot, the robot file first, each with the name of its part in a form. */
+export const robotFiles = ({ files, robot_file: first }) => files.map((file) => [file.name === first ? "robot" : "urdf", new File([file.content], file.name)])
+  .sort(([one], [other]) => one.localeCompare(other));
 
 function detectableSection(result) {
   const places = [...result.joints, null].filter((name) => result.detectable.some((each) => each.joint === name));

@@ -132,6 +132,17 @@ export function explained(problem) {
   return [h("span", { text: problem.detail ?? problem.message }), more ? [" · ", more] : null, other];
 }
 
+/** Do something; whether it was done. What went wrong is said in place of `said`. */
+export async function attempt(said, act) {
+  try {
+    await act();
+    return true;
+  } catch (error) {
+    render(said, explained(error));
+    return false;
+  }
+}
+
 export function cautions(findings) {
   const doubts = findings.filter((each) => each.severity !== "info");
   return doubts.length ? h("ul", { class: "cautions" }, doubts.map((each) => h("li", { text: `${each.where}: ${each.text}` }))) : null;

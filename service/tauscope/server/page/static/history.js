@@ -1,7 +1,7 @@
 // A robot over time: which model is in use, how its parameters move, and what somebody should know.
 
 import { getJson, post } from "./api.js";
-import { explained, h, moment, named, number, percent, render, section, state, table, tabs } from "./dom.js";
+import { attempt, h, moment, named, number, percent, render, section, state, table, tabs } from "./dom.js";
 import { plot } from "./plots.js";
 
 const STATES = { active: "in use", kept: "was in use", refused: "refused", unreadable: "damaged" };
@@ -26,10 +26,7 @@ function noteForm(event, show) {
   const reason = h("input", { id: `why-${event.number}`, required: true, maxlength: "1000", autocomplete: "off" });
   const form = h("form", { class: "row", onsubmit: async (submitted) => {
     submitted.preventDefault();
-    try {
-      await post(`events/${event.number}/acknowledge`, { reason: reason.value });
-      show();
-    } catch (error) { render(said, explained(error)); }
+    if (await attempt(said, () => post(`events/${event.number}/acknowledge`, { reason: reason.value }))) show();
   } }, h("label", { for: reason.id }, "What is it about? Kept with the event", reason), h("button", { type: "submit", text: "Take note" }), said);
   return h("li", {}, h("span", { text: `${event.robot}: ${event.text}` }), form);
 }

@@ -1,7 +1,7 @@
 // Home: drop a robot file and recordings, see them as they are understood, mend them, and read the verdict.
 
-import { fetchRaw, getJson, post } from "./api.js";
-import { cautions, explained, h, moment, named, number, percent, render, section, state, verdict } from "./dom.js";
+import { fetchRaw, formOf, getJson, post } from "./api.js";
+import { attempt, cautions, h, moment, named, number, percent, render, section, state, verdict } from "./dom.js";
 
 const MOST_ROBOTS = 12;
 const OPTIONS = /; read it with --units.*|,? or go on with --trust-units.*/; // the page has buttons for these options
@@ -40,12 +40,7 @@ export async function showHome(root, { signal }) {
     working.turn += 1;
     const { turn } = working;
     render(said);
-    try {
-      if (dropped.robot.length && !dropped.report) dropped.report = await post("robots/check", robotForm());
-    } catch (error) {
-      dropped.report = null;
-      render(said, explained(error));
-    }
+    if (dropped.robot.length && !dropped.report) await attempt(said, async () => { dropped.report = await post("robots/check", formOf(null, robotParts())); });
     for (const each of dropped.recordings) each.found = null;
     redraw();
     for (const each of dropped.recordings) {
@@ -97,18 +92,11 @@ function giveRoles(recordings) {
   if (recordings.length && recordings.every((each) => each.role === "held_out")) recordings[0].role = "recordings";
 }
 
-function robotForm() {
-  const form = new FormData();
-  dropped.robot.forEach((file, place) => form.append(place ? "urdf" : "robot", file, file.name));
-  return form;
-}
+const robotParts = () => dropped.robot.map((file, place) => [place ? "urdf" : "robot", file]);
 
 async function understand(file) {
-  const form = dropped.report ? robotForm() : new FormData();
-  form.append("request", new Blob([JSON.stringify(dropped.reading)], { type: "application/json" }));
-  form.append("file", file, file.name);
   try {
-    return await post("mappings/check", form);
+    return await post("mappings/check", formOf(dropped.reading, [...(dropped.report ? robotParts() : []), ["file", file]]));
   } catch (error) { return { mapping: null, report: null, problem: error.message }; }
 }
 
@@ -175,16 +163,12 @@ function startRow(all, isReady, said, earlier) {
     const buttons = event.target.parentElement.querySelectorAll("button");
     buttons.forEach((each) => { each.disabled = true; });
     render(said, "Sending …");
-    const form = robotForm();
-    form.append("request", new Blob([JSON.stringify({ ...more(), options: { ...all.reading, ...more().options } })], { type: "application/json" }));
-    for (const { role, file } of all.recordings) if (role) form.append(role, file, file.name);
-    try {
-      const job = await post(kind, form);
+    const used = all.recordings.filter(({ role }) => role).map(({ role, file }) => [role, file]);
+    const isSent = await attempt(said, async () => {
+      const job = await post(kind, formOf({ ...more(), options: { ...all.reading, ...more().options } }, [...robotParts(), ...used]));
       location.hash = `#/${kind}/${job.id}`;
-    } catch (error) {
-      render(said, explained(error));
-      buttons.forEach((each) => { each.disabled = false; });
-    }
+    });
+    buttons.forEach((each) => { each.disabled = isSent; });
   };
   return h("div", { class: "row start" },
     h("button", { type: "button", class: "primary", disabled: !isReady, text: "Diagnose", onclick: start("diagnoses", compared) }),

@@ -1,7 +1,7 @@
 // Identifications: how well the model explains the torque, its parameters, and its friction.
 
 import { ENDS, download, follow, getJson, remove } from "./api.js";
-import { explained, figures, h, moment, number, parameterName, percent, render, s, section, state, table, tabs, unitsOf, withError } from "./dom.js";
+import { attempt, explained, figures, h, moment, number, parameterName, percent, render, s, section, state, table, tabs, unitsOf, withError } from "./dom.js";
 import { jobList } from "./lists.js";
 import { group, plot, zoomButtons } from "./plots.js";
 
@@ -61,7 +61,7 @@ export function waiting(root, head, job, signal, show) {
   draw(job.state, job.step);
   const cancel = h("button", { type: "button", class: "quiet", text: "Cancel", onclick: async () => {
     cancel.disabled = true;
-    try { await remove(job.links.self); } catch (error) { render(said, explained(error)); cancel.disabled = false; }
+    cancel.disabled = await attempt(said, () => remove(job.links.self));
   } });
   render(root, ...head, now, h("progress", { "aria-label": "Progress" }), h("div", { class: "row" }, elapsed, cancel, said), steps);
   return follow(job.links.events, signal, (event) => {

@@ -1,7 +1,7 @@
 // Recordings: what lies on the server, and what one of them holds.
 
-import { download, getJson, getSamples, post } from "./api.js";
-import { bytes, cautions, explained, figures, h, moment, number, render, section, table } from "./dom.js";
+import { download, formOf, getJson, getSamples, post, reportOf } from "./api.js";
+import { attempt, bytes, cautions, figures, h, number, render, section, table } from "./dom.js";
 import { searchable } from "./lists.js";
 import { replay } from "./motion.js";
 import { group, jointStyle, plot, zoomButtons } from "./plots.js";
@@ -13,13 +13,8 @@ export async function showRecordings(root, { signal, show }) {
   const { recordings } = await getJson("recordings", signal);
   const said = h("p", { role: "status", class: "note" });
   const input = h("input", { type: "file", id: "upload", accept: ".csv,.parquet,.mcap,.db3", onchange: async () => {
-    const form = new FormData();
-    form.append("file", input.files[0]);
     said.textContent = "Sending …";
-    try {
-      await post("recordings", form);
-      show();
-    } catch (error) { render(said, explained(error)); }
+    if (await attempt(said, () => post("recordings", formOf(null, [["file", input.files[0]]])))) show();
   } });
   const newest = [...recordings].sort((a, b) => b.modified.localeCompare(a.modified));
   render(root, h("h1", { text: "Recordings" }), h("p", { class: "lead", text: "CSV, Parquet or MCAP; each one continuous motion." }),
@@ -34,7 +29,7 @@ export async function showRecording(root, { id, signal }) {
   render(root, ...head, h("div", { class: "placeholder", "aria-busy": "true" }));
   const run = /^run-(.+)\.csv$/.exec(id)?.[1]; // only of runs it is known what moved
   const [report, samples, robot, { recordings }] = await Promise.all([getJson(`${path}/report`, signal), getSamples(id, signal),
-    run ? getJson(`runs/${encodeURIComponent(run)}/robot`, signal).then((answer) => answer.report, () => null) : null, getJson("recordings", signal)]);
+    run ? reportOf(`runs/${encodeURIComponent(run)}`, signal) : null, getJson("recordings", signal)]);
   const time = samples.columns.t;
   const joints = Array.from({ length: samples.joint_count }, (_, place) => place + 1);
   const motion = robot?.joints.length === joints.length ? replay(robot, time, joints.map((joint) => samples.columns[`q${joint}`]), null, (row, isPlayed) => { if (isPlayed) charts.forEach((each) => each.point(time[row])); }) : null;
@@ -79,15 +74,13 @@ function overlayForm(samples, names, draw, signal) {
   const said = h("span", { role: "alert" });
   const other = h("select", { id: "overlay", onchange: () => change() }, h("option", { value: "", text: "none" }), names.map((name) => h("option", { value: name, text: name })));
   const difference = h("input", { type: "checkbox", id: "difference", onchange: () => change() });
-  async function change() {
+  const change = () => attempt(said, async () => {
     render(said);
-    try {
-      const found = other.value ? await getSamples(other.value, signal) : null;
-      const isLike = !found || (found.joint_count === samples.joint_count && found.effort === samples.effort);
-      if (!isLike) render(said, `${other.value} has other joints, or another kind of effort.`);
-      draw(isLike ? found : null, difference.checked);
-    } catch (error) { render(said, explained(error)); }
-  }
+    const found = other.value ? await getSamples(other.value, signal) : null;
+    const isLike = !found || (found.joint_count === samples.joint_count && found.effort === samples.effort);
+    if (!isLike) render(said, `${other.value} has other joints, or another kind of effort.`);
+    draw(isLike ? found : null, difference.checked);
+  });
   return h("div", { class: "row" }, h("label", { for: "overlay", class: "inline" }, "Overlay", other), h("label", { for: "difference", class: "inline" }, difference, "Difference"), said);
 }
 

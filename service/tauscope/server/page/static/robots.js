@@ -1,7 +1,7 @@
 // Robots: each arm that something is kept about, what it does at this moment, and what is known of it.
 
 import { armDrawing, jointRows } from "./arm.js";
-import { ENDS, getJson } from "./api.js";
+import { ENDS, getJson, reportOf } from "./api.js";
 import { cautions, figures, h, moment, named, number, percent, render, section, table, title } from "./dom.js";
 import { items, outcome, searchable } from "./lists.js";
 
@@ -40,7 +40,7 @@ export async function showRobot(root, { id: robot, signal }) {
   const diagnosis = here.find((each) => each.kind === "diagnosis" && each.state === "succeeded");
   const source = here.find((each) => DONE.includes(each.state)) ?? here.find((each) => each.state !== "damaged"); // what failed may have failed for its robot file
   const path = source && `${KINDS[source.kind]}/${source.id}`;
-  const report = path ? await getJson(`${path}/robot`, signal).then((answer) => answer.report, () => null) : null;
+  const report = path ? await reportOf(path, signal) : null;
   const linkTo = (kind, id, words) => h("a", { href: `#/${KINDS[kind]}/${id}`, text: words });
   render(root, h("p", { class: "eyebrow", text: "Robot" }), h("h1", { text: robot }), h("p", { class: "meta", text: holderOf(leases, robot) || "No lease is open." }),
     figures([

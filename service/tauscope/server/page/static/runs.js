@@ -1,7 +1,7 @@
 // Runs: one as it goes on, with positions, torques, room to the limits and the loop's jitter.
 
 import { armDrawing } from "./arm.js";
-import { ENDS, download, follow, getJson, post } from "./api.js";
+import { ENDS, download, follow, getJson, post, query, reportOf } from "./api.js";
 import { explained, figures, h, moment, named, number, render, section, state, table, unitsOf } from "./dom.js";
 import { diagnoseAgain } from "./diagnoses.js";
 import { jobList } from "./lists.js";
@@ -16,14 +16,14 @@ export const showRuns = jobList("runs", "run", "Runs", "Motions that were played
 export async function showRun(root, { id, signal, show }) {
   const run = await getJson(`runs/${id}`, signal);
   const monitor = ENDS.includes(run.state) ? null : liveMonitor(id);
-  const arm = monitor ? [] : await jointsOf(id);
+  const arm = monitor ? [] : (await reportOf(`runs/${id}`))?.joints ?? [];
   const status = h("div", { class: "row", role: "status" }, state(run.state));
   render(root, 
     h("p", { class: "eyebrow", text: `Run · ${run.backend?.name ?? ""}` }), h("h1", { text: run.robot ?? id }), h("p", { class: "meta", text: moment(run.created) }), status,
     run.problem ? h("p", { role: "alert" }, explained(run.problem)) : null,
     monitor?.element,
     monitor ? null : finished(run, arm));
-  const after = new URLSearchParams(location.hash.split("?")[1] ?? "").get("after");
+  const after = query("after");
   if (after && run.state === "finished" && run.recording?.name) {
     render(status, state(run.state), h("span", { text: " Handing the diagnosis in …" }));
     try {
@@ -74,7 +74,7 @@ export function liveMonitor(id) {
   const rows = { position: [], target: [], effort: [] };
 
   let isKnown = false; // whether it has been answered what the joints are called
-  getJson(`runs/${id}/robot`).then(({ report }) => { arm = report.joints; drawing = armDrawing(report); render(pose, drawing.element); })
+  reportOf(`runs/${id}`).then((report) => { if (report) { arm = report.joints; drawing = armDrawing(report); render(pose, drawing.element); } })
     .catch(() => {}).finally(() => { isKnown = true; });
 
   function begin(count) {
@@ -112,8 +112,6 @@ export function liveMonitor(id) {
   const element = h("section", { "aria-label": "Live" }, bar, words, h("div", { class: "split" }, pose, h("div", {}, joints, jitter)), plots);
   return { element, take };
 }
-
-const jointsOf = (id) => getJson(`runs/${id}/robot`).then(({ report }) => report.joints, () => []);
 
 const nameOf = (arm, joint) => arm[joint]?.name ?? `joint ${joint + 1}`;
 

@@ -1,7 +1,4 @@
-"""The tables of the database: the index of all items, the models of each robot, and the schedules.
-
-The folders are the truth; the index is made from them, and made again where it is missing.
-"""
+"""The tables of the database: the index, made from the folders, the models of robots, and schedules."""
 
 from datetime import UTC, datetime
 from typing import Any, ClassVar

@@ -1,4 +1,4 @@
-"""The simulated arm in real time: its process, which outlives whoever started it, and a host's connection to it."""
+"""The simulated arm behind the protocol of `drivers`: in virtual time, and in real time in a process of its own."""
 
 import contextlib
 import json
@@ -8,19 +8,19 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tauscope.robot import Robot, robot_to_dict
 from tauscope_drivers import (
     ArmState,
     Capabilities,
-    Clock,
     ControlMode,
     DriveLimits,
     DriverError,
@@ -30,10 +30,96 @@ from tauscope_drivers import (
 )
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_drivers.limits import require_finite
-from tauscope_sim.device import messages
-from tauscope_sim.device.device import WATCHDOG_RANGE_S
+from tauscope_sim.device import SimulatedDevice, messages
+from tauscope_sim.device.device import list_capabilities
 from tauscope_sim.device.faults import Injection
 from tauscope_sim.own_process import process_environment
+from tauscope_sim.scenario import Scenario
+
+
+class VirtualClock:
+    """The clock of a simulated device. `start_ns`: first instant; `advance`: lets the device live up to one [ns]."""
+
+    def __init__(self, start_ns: int, advance: Callable[[int], None]) -> None:
+        self._now_ns = start_ns
+        self._advance = advance
+
+    def now_ns(self) -> int:
+        """The present instant [ns]."""
+        return self._now_ns
+
+    def wait_until_ns(self, deadline_ns: int) -> int:
+        """Let the device live up to a deadline, and return there; at once where it has passed."""
+        if deadline_ns > self._now_ns:
+            self._now_ns = deadline_ns
+            self._advance(deadline_ns)
+        return self._now_ns
+
+
+class SimulatedArm:
+    """A backend whose clock carries the device forward, which keeps its place and faults while disconnected.
+
+    `start_position`: (n,), None: `tauscope_sim.device.mechanism.resting_posture` [rad or m]. Raises as
+    `SimulatedDevice` does.
+    """
+
+    def __init__(
+        self, robot: Robot, scenario: Scenario | None = None, *, start_position: ArrayLike | None = None
+    ) -> None:
+        kept = Scenario() if scenario is None else scenario
+        self.device = SimulatedDevice(robot, kept, start_position=start_position)
+        """the drives and the arm, for tests and demonstrations"""
+        self.capabilities = self.device.capabilities
+        self.clock = VirtualClock(self.device.time_ns, self.device.advance_to)
+        self._connected = False
+
+    def connect(self) -> ArmState:
+        """Reach the device and read it. Raises DriverError: ``cannot-connect`` where it is connected already."""
+        if self._connected:
+            raise DriverError.no_connection("the arm is connected already; disconnect it first")
+        self._connected = True
+        return self.device.read()
+
+    def acknowledge_faults(self) -> ArmState:
+        """Clear the latched faults; see `drivers.Backend`."""
+        self._require_connection()
+        self.device.acknowledge_faults()
+        return self.device.read()
+
+    def enable(
+        self,
+        mode: ControlMode,
+        limits: DriveLimits,
+        stop_policy: StopPolicy,
+        watchdog_s: float,
+        cycle_s: float | None = None,
+    ) -> ArmState:
+        """Take the arm under power; see `drivers.Backend`. `watchdog_s`: without `exchange`, in virtual time [s]."""
+        del cycle_s
+        self._require_connection()
+        self.device.enable(mode, limits, stop_policy, watchdog_s)
+        return self.device.read()
+
+    def exchange(self, setpoint: Setpoint) -> ArmState:
+        """Write the setpoints, read the arm; see `drivers.Backend`."""
+        self._require_connection()
+        self.device.command(setpoint, self.clock.now_ns())
+        return self.device.read()
+
+    def stop(self, policy: StopPolicy) -> ArmState:
+        """Stop the arm; legal at any time, also while disconnected."""
+        self.device.stop(policy)
+        return self.device.read()
+
+    def disconnect(self) -> None:
+        """Let go of the device; an arm that is still enabled is stopped by its own policy first."""
+        self.device.stop()
+        self._connected = False
+
+    def _require_connection(self) -> None:
+        if not self._connected:
+            raise DriverError(DriverErrorKind.NOT_CONNECTED, "the arm is not connected; connect it first")
+
 
 START_TIMEOUT_S = 60.0  # time within which the process has to be ready [s]
 
@@ -76,9 +162,8 @@ def start_device(
 ) -> DeviceProcess:
     """Start a simulated arm in real time, in a session of its own: signals to the caller's group do not reach it.
 
-    Raises DriverError ``cannot-connect`` where the process did not start, with its own message.
-    `start_position`: where the arm stands; None is `tauscope_sim.device.mechanism.resting_posture` [rad or m];
-    `linger_s`: how long the process goes on without a host [s].
+    Raises DriverError ``cannot-connect`` with the process's message. `start_position`: None: `resting_posture`;
+    `linger_s`: without a host [s].
     """
     socket, trace, log = folder / "device.sock", folder / "device.csv", folder / "device.log"
     if len(os.fsencode(socket)) > _LONGEST_SOCKET_PATH:
@@ -130,15 +215,13 @@ _PATIENCE_S = 2.0
 class RemoteSimulatedArm:
     """A backend that reaches the device process over its Unix socket; see `tauscope_sim.driver.start_device`.
 
-    The device keeps its own watchdog: it stops the arm when this process is killed, stopped or cut off. A reply that
-    does not come in time leaves not-a-number in the state of that cycle; `ArmState.enabled` is then as last known.
-
-    `reply_timeout_s`: how long one cycle waits for its reply [s].
+    The device stops the arm when this process is killed, stopped or cut off. Without a reply within `reply_timeout_s`
+    [s] the state of a cycle is not-a-number, and `ArmState.enabled` as last known.
     """
 
     def __init__(self, path: Path, joint_count: int, *, reply_timeout_s: float = 0.02) -> None:
         self._path, self._count, self._reply_timeout_s = path, joint_count, reply_timeout_s
-        self._clock = MonotonicClock()
+        self.clock = MonotonicClock()
         self._socket: socket.socket | None = None
         self._buffer = messages.FrameBuffer()
         self._sequence = 0
@@ -147,26 +230,10 @@ class RemoteSimulatedArm:
     @property
     def capabilities(self) -> Capabilities:
         """What it can do."""
-        return Capabilities(
-            joint_count=self._count,
-            modes=frozenset(ControlMode),
-            stop_policies=frozenset(StopPolicy),
-            largest_rate_hz=LARGEST_RATE_HZ,
-            watchdog_range_s=WATCHDOG_RANGE_S,
-            takes_feed_forward=True,
-        )
-
-    @property
-    def clock(self) -> Clock:
-        """The machine's monotonic clock, which is the device's too."""
-        return self._clock
+        return list_capabilities(self._count, LARGEST_RATE_HZ)
 
     def connect(self) -> ArmState:
-        """Reach the device and read it.
-
-        Raises DriverError: ``cannot-connect`` where there is no device, another host has it, or it has another number
-        of joints.
-        """
+        """Reach the device and read it. Raises DriverError ``cannot-connect``: missing, taken, or of other joints."""
         if self._socket is not None:
             raise DriverError.no_connection("the arm is connected already; disconnect it first")
         connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -204,10 +271,7 @@ class RemoteSimulatedArm:
         watchdog_s: float,
         cycle_s: float | None = None,
     ) -> ArmState:
-        """Take the arm under power where it stands; see `drivers.Backend`.
-
-        `watchdog_s`: time without `exchange` after which it does [s].
-        """
+        """Take the arm under power where it stands; see `drivers.Backend`. `watchdog_s`: without `exchange` [s]."""
         del cycle_s
         asked = messages.encode_enable(mode, limits, stop_policy, watchdog_s)
         return self._state_after(messages.FrameKind.ENABLE, asked)
@@ -215,7 +279,7 @@ class RemoteSimulatedArm:
     def exchange(self, setpoint: Setpoint) -> ArmState:
         """Write the setpoints, read the arm; see `drivers.Backend`."""
         require_finite(setpoint, self._count)
-        body = messages.encode_setpoint(self._clock.now_ns(), setpoint)
+        body = messages.encode_setpoint(self.clock.now_ns(), setpoint)
         try:
             reply = self._request(messages.FrameKind.EXCHANGE, body, self._reply_timeout_s)
         except TimeoutError:
@@ -223,10 +287,7 @@ class RemoteSimulatedArm:
         return self._state_of(reply)
 
     def stop(self, policy: StopPolicy) -> ArmState:
-        """Stop the arm; where there is no connection the device has done so by itself, and nothing is known of it.
-
-        Raises DriverError: ``lost`` where the device does not confirm.
-        """
+        """Stop the arm, which has done so itself where there is no connection. Raises DriverError ``lost``."""
         if self._socket is None:
             return self._miss()
         return self._state_after(messages.FrameKind.STOP, messages.encode_document(policy))
@@ -308,7 +369,7 @@ class RemoteSimulatedArm:
 
     def _miss(self) -> ArmState:
         nothing = np.full(self._count, np.nan)
-        return ArmState(self._clock.now_ns(), nothing, nothing, nothing, nothing, self._enabled)
+        return ArmState(self.clock.now_ns(), nothing, nothing, nothing, nothing, self._enabled)
 
     def _lose(self, reason: str) -> DriverError:
         self._close()
