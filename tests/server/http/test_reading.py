@@ -85,7 +85,7 @@ def test_a_caller_who_asks_for_much_keeps_nobody_else_waiting(pool: WorkerPool) 
 @pytest.mark.usefixtures("reader_processes")
 def test_reading_has_a_deadline(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = settings.model_copy(update={"reading_timeout_s": 0.3})
-    monkeypatch.setattr("tauscope.server.http.recordings.check_kept_recording", wait_for_ever)
+    monkeypatch.setattr("tauscope.server.queue.received_files.check_kept_recording", wait_for_ever)
     with connected(create_app(settings, InlineExecutor())) as client:
         send(client)
         problem = client.get(f"{RECORDINGS}/a.csv/report")
