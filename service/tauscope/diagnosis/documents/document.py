@@ -33,12 +33,7 @@ from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.model.torque_scale import on_the_arm
 from tauscope.diagnosis.next_experiment import PlannedExperiment
 from tauscope.effects import Effect, Quantity, effect_class
-from tauscope.identification.warnings import (
-    excitation_warnings,
-    extrapolation_warnings,
-    extrapolations,
-    robot_warnings,
-)
+from tauscope.identification.warnings import excitation_warnings, extrapolation_warnings, extrapolations, robot_warnings
 from tauscope.recording.recording import Array
 from tauscope.result_warning import ResultWarning
 
@@ -138,12 +133,7 @@ def _warnings(diagnosis: Diagnosis) -> list[ResultWarning]:
     """Warnings of the files and of the motion; what training hardly tells where that leaves the verdict open."""
     found = diagnosis.identification
     weak = excitation_warnings(found) if diagnosis.verdict is Verdict.INCONCLUSIVE else ()
-    return [
-        *robot_warnings(diagnosis.robot),
-        *found.recording_warnings,
-        *extrapolation_warnings(found),
-        *weak,
-    ]
+    return [*robot_warnings(diagnosis.robot), *found.recording_warnings, *extrapolation_warnings(found), *weak]
 
 
 def _differences(diagnosis: Diagnosis, names: Sequence[str]) -> list[DifferenceEntry]:

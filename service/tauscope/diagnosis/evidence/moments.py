@@ -71,13 +71,7 @@ class JointMoments:
 
     @staticmethod
     def of(
-        index: Index,
-        target: Array,
-        columns: Array,
-        features: Array,
-        bounds: Index,
-        counts: Array,
-        groups: Index,
+        index: Index, target: Array, columns: Array, features: Array, bounds: Index, counts: Array, groups: Index
     ) -> "JointMoments":
         """From rows that are ordered by class."""
         rows = np.vstack([target[None], columns, features])

@@ -138,7 +138,5 @@ class Diagnosis:
         standing = [each for each in added if each.confirmed is not False]
         refuted = [each for each in added if each.confirmed is False]
         return replace(
-            self,
-            findings=in_order([*self.findings, *standing]),
-            tentative=in_order([*self.tentative, *refuted]),
+            self, findings=in_order([*self.findings, *standing]), tentative=in_order([*self.tentative, *refuted])
         )

@@ -79,13 +79,7 @@ def locate(nominal: Fit, fit: Fit, observations: Observations, left: Sequence[bo
 
 
 def _places(
-    joint: int,
-    observations: Observations,
-    signals: Sequence[Signals],
-    used: BoolArray,
-    power: Array,
-    *,
-    thermal: bool,
+    joint: int, observations: Observations, signals: Sequence[Signals], used: BoolArray, power: Array, *, thermal: bool
 ) -> Iterator[Place | None]:
     """Places of the excess of one joint, variable by variable."""
 

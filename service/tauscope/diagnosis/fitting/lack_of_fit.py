@@ -59,11 +59,7 @@ class LackOfFit:
 
 
 def lack_of_fit(
-    fit: Fit,
-    observations: Observations,
-    dependence: Sequence[float] | None = None,
-    *,
-    pure_error: bool,
+    fit: Fit, observations: Observations, dependence: Sequence[float] | None = None, *, pure_error: bool
 ) -> LackOfFit:
     """Test what a model leaves.
 

@@ -23,11 +23,7 @@ DURATION_S = 20.0
 
 WIDE = "a wide motion"
 
-KINDS = {
-    "a random motion": (10.0, 5),
-    "a fast motion": (4.0, 4),
-    WIDE: (10.0, 2),
-}
+KINDS = {"a random motion": (10.0, 5), "a fast motion": (4.0, 4), WIDE: (10.0, 2)}
 """Period [s] and harmonics of the Fourier series."""
 
 SWEEP_SHARES = (0.08, 0.3, 0.8)
