@@ -18,10 +18,7 @@ from tauscope.recording.recording import Recording
 from tauscope.robot import Robot
 
 __all__ = ["Diagnosis", "Finding", "FitSizes", "diagnose"]
-
-DEFAULT = Options()
-"""An identification as nobody asked otherwise."""
-
+DEFAULT = Options()  # an identification as nobody asked otherwise
 Progress = Callable[[str], None]
 
 

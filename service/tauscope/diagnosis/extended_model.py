@@ -23,8 +23,7 @@ from tauscope.robot import LinkInertia, Robot
 from tauscope.robot.messages import shown
 from tauscope.strict_model import ResultModel
 
-SMALLEST = 1e-12
-"""Eigenvalues of the scaled covariance below this share of the largest are no direction."""
+SMALLEST = 1e-12  # eigenvalues of the scaled covariance below this share of the largest are no direction
 
 
 def consistent_links(diagnosis: Diagnosis) -> tuple[LinkInertia, ...]:
@@ -43,9 +42,7 @@ def consistent_links(diagnosis: Diagnosis) -> tuple[LinkInertia, ...]:
 
 
 LARGEST_FILE = 16 * 2**20
-
-PLACES = ("joint", "grid", "lower", "upper")
-"""Fields of every effect; any others are settings of its own."""
+PLACES = ("joint", "grid", "lower", "upper")  # fields of every effect; any others are settings of its own
 
 
 class NamedValue(ResultModel):

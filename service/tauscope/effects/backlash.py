@@ -40,14 +40,10 @@ DAMPING = 0.2
 def place_between_teeth(load: Array, inertia: Array, gap: float, rate_hz: float) -> Array:
     """Where a link is in the play of its transmission, in gaps from the middle, -1/2 … 1/2.
 
-    The teeth carry the load on one side until it turns its sign. Then the link moves on under its load alone,
-    I δ̈ = τ_rb, until it meets teeth again, where it stays: gears and their grease swallow the shock.
-
-    `load`: (N,), τ_rb [Nm or N].
-    `inertia`: (N,), I; where it is zero all along, the link crosses at once [kg m² or kg].
-    `gap`: b, above zero [rad or m].
-    `rate_hz`: sampling rate [Hz].
-    Returns (N,), δ/b.
+    The teeth carry the load on one side until it turns its sign. Then the link moves on under its load alone, I δ̈ =
+    τ_rb, until it meets teeth again, where it stays: gears and their grease swallow the shock. `load`: (N,), τ_rb [Nm
+    or N]; `inertia`: (N,), I; where it is zero all along, the link crosses at once [kg m² or kg]; `gap`: b, above zero
+    [rad or m]; `rate_hz`: sampling rate [Hz]. Returns (N,), δ/b.
     """
     sides = np.where(load >= 0.0, 0.5, -0.5)
     if not inertia.all():
@@ -75,15 +71,9 @@ def place_between_springs(
 
     I δ̈ = τ_rb - T with T = max(0, K x (1 + c ẋ) + D ẋ) of the overlap x = |δ| - b/2 where that is above zero, against
     δ: teeth push and never pull. c is the loss of Hunt and Crossley (J. Appl. Mech. 42, 1975), which grows with the
-    overlap, D = 2 ζ √(K Ī). By leapfrog steps, from rest on the teeth under the first load.
-
-    `load`: (N,), τ_rb [Nm or N].
-    `inertia`: (N,), I, above zero [kg m² or kg].
-    `gap`: b, above zero [rad or m].
-    `compliance`: 1/K [rad/Nm or m/N].
-    `loss`: c [s/rad or s/m].
-    `rate_hz`: sampling rate [Hz].
-    Returns (N,), δ/b.
+    overlap, D = 2 ζ √(K Ī). By leapfrog steps, from rest on the teeth under the first load. `load`: (N,), τ_rb [Nm or
+    N]; `inertia`: (N,), I, above zero [kg m² or kg]; `gap`: b, above zero [rad or m]; `compliance`: 1/K [rad/Nm or
+    m/N]; `loss`: c [s/rad or s/m]; `rate_hz`: sampling rate [Hz]. Returns (N,), δ/b.
     """
     highest_hz = 1.0 / (2.0 * np.pi * math.sqrt(compliance * float(inertia.min())))
     time = np.arange(len(load)) / rate_hz

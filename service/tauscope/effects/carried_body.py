@@ -16,7 +16,6 @@ from tauscope.robot.robot import STANDARD_PARAMETERS
 
 FARTHEST_M = 0.5  # distance from the last link's origin at which nobody carries anything [m]
 MASS = Coefficient("m", "kg")
-
 PLACE = (Shape("r_x", "m", reported=False), Shape("r_y", "m", reported=False), Shape("r_z", "m", reported=False))
 
 

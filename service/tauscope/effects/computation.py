@@ -9,7 +9,6 @@ Item = TypeVar("Item")
 Done = TypeVar("Done")
 Key = TypeVar("Key", bound=Hashable)
 Made = TypeVar("Made")
-
 THREADS = 2  # more threads gain nothing: they share the memory's speed, and Python between arrays
 
 

@@ -11,7 +11,6 @@ from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
 T = TypeVar("T")
-
 # Rms of a joint's rigid-body torque relative to its largest torque below which nothing presses its transmission.
 LEAST_LOAD = 0.02
 ONE_WAY = 0.1  # speed the other way, relative to the rms, below which a joint does not reverse
@@ -19,35 +18,28 @@ ONE_WAY = 0.1  # speed the other way, relative to the rms, below which a joint d
 
 @dataclass(frozen=True, eq=False)
 class ArmContext:
-    """The arm and the ranges of its recorded motion.
-
-    `slowest`, `fastest`: (n,), range of every joint's velocity, the rarest percents left out [rad/s or m/s].
-    `lowest`, `highest`: (n,), range of every joint's position [rad or m].
-    `speed`, `top_speed`: (n,), rms and largest magnitude of every joint's velocity [rad/s or m/s].
-    `load`, `top_torque`: (n,), rms of the fitted rigid-body torque, largest magnitude of the model's torque [Nm or N].
-    `inertia`: (n,), mean of every joint's inertia with all that it carries, zero where the fit knows of none [kg m² or
-    kg].
-    `position_std`: (n,) or None, noise of every joint's position, its encoder's steps included [rad or m]; None where
-    it is negligible.
-    `coldest`, `hottest`: (n,), range of every joint's recorded temperature [°C]; NaN where there is none.
-    `link_encoders`: joints, from 0, whose transmission an encoder on the link has shown as it is.
-    """
+    """The arm and the ranges of its recorded motion."""
 
     robot: Robot
-    slowest: Array
-    fastest: Array
-    lowest: Array
-    highest: Array
-    speed: Array
-    top_speed: Array
-    load: Array
-    top_torque: Array
+    slowest: Array  # (n,), of every joint's velocity, the rarest percents left out [rad/s or m/s]
+    fastest: Array  # (n,)
+    lowest: Array  # (n,), of every joint's position [rad or m]
+    highest: Array  # (n,)
+    speed: Array  # (n,), rms of every joint's velocity [rad/s or m/s]
+    top_speed: Array  # (n,), its largest magnitude
+    load: Array  # (n,), rms of the fitted rigid-body torque [Nm or N]
+    top_torque: Array  # (n,), largest magnitude of the model's torque [Nm or N]
+    # (n,), mean of every joint's inertia with all that it carries, zero where the fit knows of none [kg m² or kg]
     inertia: Array
     durations: tuple[float, ...]  # length of every training recording [s]
     cutoff_hz: float  # highest frequency that torque and columns share [Hz]
+    # (n,) or None, noise of every joint's position, its encoder's steps included [rad or m]; None where it is
+    # negligible
     position_std: Array | None = None
+    # (n,), of every joint's recorded temperature [°C]; NaN where there is none
     coldest: Array = field(default_factory=lambda: np.zeros(0))
-    hottest: Array = field(default_factory=lambda: np.zeros(0))
+    hottest: Array = field(default_factory=lambda: np.zeros(0))  # (n,)
+    # joints, from 0, whose transmission an encoder on the link has shown as it is
     link_encoders: frozenset[int] = frozenset()
 
     @property
@@ -75,31 +67,25 @@ class ArmContext:
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """One piece of conditioned motion at the recorded rate, samples last, with the fitted model's torque.
-
-    `recording`: index of the recording, from 0; held-out recordings have negative ones.
-    `position`, `velocity`, `acceleration`: (n, N), q, q̇, q̈.
-    `bodies`: (10 n,), standard parameters that stand for the fitted base parameters: all that torque along this chain
-    needs.
-    `links`: (10 n,), standard parameters of the nearest physically consistent links, for another chain or another
-    gravity.
-    `temperature`: (n, P, N) or None, recorded temperature [°C]; NaN at joints without, None where none was recorded.
-    """
+    """One piece of conditioned motion at the recorded rate, samples last, with the fitted model's torque."""
 
     robot: Robot
     rate_hz: float  # sampling rate [Hz]
     time: Array  # (P, N), instants of every repetition, from the beginning of the recording [s]
-    recording: int
-    position: Array
+    recording: int  # index of the recording, from 0; held-out recordings have negative ones
+    position: Array  # (n, N), q; as are q̇, q̈
     velocity: Array
     acceleration: Array
     load: Array  # (n, N), fitted torque of the rigid body, which the transmission carries [Nm or N]
     torque: Array  # (n, N), fitted torque of the whole model [Nm or N]
     step: Array  # (n, N), A(K_v q̇), the smooth sign of the velocity
     steepness: Array  # (n,), K_v [s/rad or s/m]
+    # (10 n,), standard parameters that stand for the fitted base parameters: all that torque along this chain needs
     bodies: Array
+    # (10 n,), standard parameters of the nearest physically consistent links, for another chain or another gravity
     links: Array
     periodic: bool
+    # (n, P, N) or None, recorded temperature [°C]; NaN at joints without, None where none was recorded
     temperature: Array | None = None
     of_motion: dict[str, Any] = field(default_factory=dict, repr=False)
     _memory: dict[str, Any] = field(default_factory=dict, repr=False)

@@ -31,8 +31,6 @@ LEAST_INERTIA = 0.05  # share of a joint's largest inertia below which a fitted 
 # simulated arms 0.02 to 0.25 beyond the standard error.
 FIRST_ORDER = 0.12
 BAND = Shape("band", "Hz", fixed=True, reported=False)  # of the load that deflects the transmission
-
-
 # Samples (K,) at which slopes are taken, and those of some columns of Φ there, (n, C, K): 1e-7 is more than enough.
 _Slopes = tuple[NDArray[np.intp], NDArray[np.float32]]
 
@@ -64,10 +62,8 @@ class Deflection(Effect):
     def deflection(self, load: Array, inertia: Array, shape: Array, rate_hz: float) -> Array:
         """δ per unit of the coefficient along a motion, (N,).
 
-        `load`: (N,), τ_rb, smoothed [Nm or N].
-        `inertia`: (N,), of the link and all that it carries, zero where it is not known [kg m² or kg].
-        `shape`: (k,), values of the shape parameters.
-        `rate_hz`: sampling rate [Hz].
+        `load`: (N,), τ_rb, smoothed [Nm or N]; `inertia`: (N,), of the link and all that it carries, zero where it is
+        not known [kg m² or kg]; `shape`: (k,), values of the shape parameters; `rate_hz`: sampling rate [Hz].
         """
 
     def columns(self, signals: Signals, shapes: Array) -> Array:

@@ -22,8 +22,6 @@ Entry = dict[str, Any]
 _STEP = "atan({k_v} * v) * 0.6366197723675814"  # A(K_v v), the smooth sign, in C and Python
 _POSITION = {JointType.REVOLUTE: "rad", JointType.PRISMATIC: "m"}
 _TORQUE = {JointType.REVOLUTE: "Nm", JointType.PRISMATIC: "N"}
-
-
 SHORT_S = 0.5  # times below this are told in milliseconds [s]
 NO_SHAPE = np.zeros((1, 0))  # the grid of an effect without shape parameters
 
@@ -85,54 +83,39 @@ def percent_text(value: float) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Effect(ABC):
-    """One form of an effect at one place.
-
-    `grid`: (g, k), values of the shape parameters at which the effect is looked for.
-    `lower`, `upper`: (k,), bounds of the shape parameters.
-
-    Columns of an effect `of_motion_alone` are the same beside every model, and are made once; those of one that
-    `has_step` change with K_v of its joint; one `of_motion_and_step` changes with nothing else of the model.
-    An effect that is `screened` is looked for beside the nominal model; any other becomes a finding by comparison with
-    a given model.
-    What its law depends on are its `arguments`: ``position``, ``velocity``, ``acceleration`` of its joint, the ``load``
-    on its transmission, ``time``, the ``others``' motion; None where it acts on whatever torque there is.
-    `code` is the torque as an expression that C and Python share: q, v and load are position, velocity and rigid-body
-    torque of the joint, {c[0]} and {s[0]} the first coefficient and shape, {step} the smooth sign of v, {effect} the
-    object. Without it, `no_code` is the reason. `no_scenario` is the reason where a scenario cannot hold the effect.
-    `rank` is its place in the catalogue and in documents.
-    One that `is_variant` is a form of the effect of the same id and stands in no catalogue itself.
-    Every geared joint may have one that `is_expected`: it counts towards no limit, and nothing is doubted beside it.
-    One that `has_constant` of its own shows it as the nominal model's offset.
-    One that `bends` the torque has a `slope` that changes with it.
-    """
+    """One form of an effect at one place."""
 
     id: ClassVar[str]
     equation: ClassVar[str]
     meaning: ClassVar[str]
     remedy: ClassVar[str]
     revealing_motion: ClassVar[str]
+    # The torque as an expression that C and Python share: q, v and load are position, velocity and rigid-body torque of
+    # the joint, {c[0]} and {s[0]} the first coefficient and shape, {step} the smooth sign of v, {effect} the object.
     code: ClassVar[str] = ""
-    no_code: ClassVar[str] = ""
-    no_scenario: ClassVar[str] = ""
-    rank: ClassVar[int] = 0
-    is_variant: ClassVar[bool] = False
+    no_code: ClassVar[str] = ""  # why there is none
+    no_scenario: ClassVar[str] = ""  # why a scenario cannot hold the effect
+    rank: ClassVar[int] = 0  # its place in the catalogue and in documents
+    is_variant: ClassVar[bool] = False  # a form of the effect of the same id, which stands in no catalogue itself
     refines: ClassVar[frozenset[str]] = frozenset()
-    is_expected: ClassVar[bool] = False
-    has_constant: ClassVar[bool] = False
+    is_expected: ClassVar[bool] = False  # of every geared joint: counts towards no limit, nothing is doubted beside it
+    has_constant: ClassVar[bool] = False  # of its own, which the nominal model shows as its offset
     coefficients: ClassVar[tuple[Coefficient, ...]]
     shapes: ClassVar[tuple[Shape, ...]] = ()
     repeats: ClassVar[bool] = False
-    of_motion_alone: ClassVar[bool] = False
-    has_step: ClassVar[bool] = False
-    of_motion_and_step: ClassVar[bool] = False
-    screened: ClassVar[bool] = True
+    of_motion_alone: ClassVar[bool] = False  # its columns are the same beside every model, and are made once
+    has_step: ClassVar[bool] = False  # they change with K_v of its joint…
+    of_motion_and_step: ClassVar[bool] = False  # …and with nothing else of the model
+    screened: ClassVar[bool] = True  # looked for beside the nominal model; others are found against a given model
+    # What its law depends on: `position`, `velocity`, `acceleration` of its joint, the `load` on its transmission,
+    # `time`, the `others`' motion; None where it acts on whatever torque there is.
     arguments: ClassVar[frozenset[str] | None] = None
-    bends: ClassVar[bool] = False
+    bends: ClassVar[bool] = False  # the torque has a `slope` that changes with it
 
     joint: int | None  # None for the whole arm
-    grid: Array = field(default_factory=lambda: NO_SHAPE)
-    lower: Array = field(default_factory=lambda: np.zeros(0))
-    upper: Array = field(default_factory=lambda: np.zeros(0))
+    grid: Array = field(default_factory=lambda: NO_SHAPE)  # (g, k), shapes at which the effect is looked for
+    lower: Array = field(default_factory=lambda: np.zeros(0))  # (k,), bounds of the shapes
+    upper: Array = field(default_factory=lambda: np.zeros(0))  # (k,)
 
     @classmethod
     def forms(cls, context: ArmContext) -> "Sequence[Effect]":

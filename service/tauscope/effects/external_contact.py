@@ -16,7 +16,6 @@ from tauscope.robot.robot import STANDARD_PARAMETERS
 LENGTHS_S = (0.5, 1.5, 4.5)  # lengths of the windows looked through [s]
 OVERLAP = 0.4  # part of a window that its neighbour covers too
 JOINTS_FOR_A_FORCE = 3  # joints from which the three components of a force can be told apart
-
 _WINDOW = (
     Shape("scope", "1", fixed=True, reported=False),
     Shape("t_0", "s"),

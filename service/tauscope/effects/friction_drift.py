@@ -11,8 +11,6 @@ from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, Sizes,
 from tauscope.recording.recording import Array
 
 TIMES = np.array([0.08, 0.2, 0.5, 1.2, 3.0])  # time constants looked at, relative to the longest recording
-
-
 # Range of a recorded temperature from which friction may follow it [K]: motors report whole degrees.
 LEAST_WARMING = 2.0
 RATES = np.array([0.0, 0.03])  # relative changes of viscosity looked at [1/K]: greases and oils lose 2 to 5 % a kelvin

@@ -24,13 +24,9 @@ DAMPING = 0.1  # damping ratio of the resonance: gears and bearings make it heav
 def transmitted(load: Array, inertia: Array, compliance: float, rate_hz: float) -> Array:
     """What a spring transmits to a link whose load is given for a rigid transmission: I δ̈ + D δ̇ + K δ = τ_rb.
 
-    D = 2 ζ √(K Ī) with the mean inertia Ī. By the trapezoidal rule, from rest under the first load.
-
-    `load`: (N,), τ_rb [Nm or N].
-    `inertia`: (N,), I, above zero [kg m² or kg].
-    `compliance`: 1/K [rad/Nm or m/N].
-    `rate_hz`: sampling rate [Hz].
-    Returns (N,), K δ [Nm or N].
+    D = 2 ζ √(K Ī) with the mean inertia Ī. By the trapezoidal rule, from rest under the first load. `load`: (N,), τ_rb
+    [Nm or N]; `inertia`: (N,), I, above zero [kg m² or kg]; `compliance`: 1/K [rad/Nm or m/N]; `rate_hz`: sampling rate
+    [Hz]. Returns (N,), K δ [Nm or N].
     """
     by_acceleration = rate_hz**2 * compliance * inertia
     by_rate = DAMPING * rate_hz * np.sqrt(compliance * inertia.mean())

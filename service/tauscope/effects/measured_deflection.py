@@ -17,17 +17,14 @@ from tauscope.recording.recording import Array
 
 @dataclass(frozen=True, eq=False)
 class MeasuredElasticity(JointElasticity):
-    """Compliance from q - q_link over the load.
-
-    `compliance`, `compliance_std`: c and its standard error [rad/Nm or m/N].
-    """
+    """Compliance from q - q_link over the load."""
 
     is_variant = True
     equation = "q - q_link = c tau_rb, c = 1/stiffness"
     meaning = "the transmission gives way under load: the encoder on the link shows it"
 
-    compliance: float = 0.0
-    compliance_std: float = 0.0
+    compliance: float = 0.0  # c [rad/Nm or m/N]
+    compliance_std: float = 0.0  # its standard error
 
     @classmethod
     def of(cls, context: ArmContext, joint: int, compliance: float, std: float) -> "MeasuredElasticity":
@@ -47,17 +44,14 @@ class MeasuredElasticity(JointElasticity):
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPlay(Backlash):
-    """Play from the jump of q - q_link where the load changes its sign.
-
-    `play`, `play_std`: b and its standard error [rad or m].
-    """
+    """Play from the jump of q - q_link where the load changes its sign."""
 
     is_variant = True
     equation = "q - q_link = b/2 sgn(tau_rb)"
     meaning = "the transmission has play when the load changes sign: the encoder on the link shows it"
 
-    play: float = 0.0
-    play_std: float = 0.0
+    play: float = 0.0  # b [rad or m]
+    play_std: float = 0.0  # its standard error
 
     @classmethod
     def of(cls, context: ArmContext, joint: int, play: float, std: float) -> "MeasuredPlay":
@@ -77,28 +71,22 @@ class MeasuredPlay(Backlash):
 
 @dataclass(frozen=True, eq=False)
 class MeasuredTeeth(SpringyTeeth):
-    """The same where the encoder also shows that the teeth give way.
-
-    `play`, `play_std`: b and its standard error [rad or m].
-    `compliance`, `compliance_std`: c and its standard error [rad/Nm or m/N].
-    """
+    """The same where the encoder also shows that the teeth give way."""
 
     is_variant = True
     equation = "q - q_link = b/2 sgn(tau_rb) + c tau_rb"
     meaning = MeasuredPlay.meaning
 
-    play: float = 0.0
-    play_std: float = 0.0
-    compliance: float = 0.0
-    compliance_std: float = 0.0
+    play: float = 0.0  # b [rad or m]
+    play_std: float = 0.0  # its standard error
+    compliance: float = 0.0  # c [rad/Nm or m/N]
+    compliance_std: float = 0.0  # its standard error
 
     @classmethod
     def of(cls, context: ArmContext, joint: int, play: Array, compliance: Array) -> "MeasuredTeeth":
         """The form of a joint.
 
-        `joint`: index, from 0.
-        `play`: (2,), b and its standard error [rad or m].
-        `compliance`: (2,), c and its standard error [rad/Nm or m/N].
+        `play`: (2,), b and its standard error [rad or m]; `compliance`: (2,), c and its standard error [rad/Nm or m/N].
         """
         band = np.array([SPRINGY_BAND * context.cutoff_hz])
         grid = mesh(play[:1], band, compliance[:1], LOSSES)

@@ -91,7 +91,6 @@ def carried(mass: float, shape: Array, durations: Sequence[float]) -> tuple[floa
     """The sign that makes the mass positive, and which of the window's edges are its being picked up and dropped.
 
     Beside a nominal model that has it or not, a mass that is missing in one part is a mass that is carried in the rest.
-
     `mass`: m [kg]; `shape`: (7,), the window; `durations`: of the recordings [s].
     """
     scope, start, end = shape[:3]
@@ -111,9 +110,7 @@ def carried(mass: float, shape: Array, durations: Sequence[float]) -> tuple[floa
 def payload_windows(durations: Sequence[float]) -> Array:
     """Windows (g, 7) in which something may be carried: scope, start, end, profile, and r = 0.
 
-    Within one recording, at the same instants of all, or from one recording on.
-
-    `durations`: of the recordings [s].
+    Within one recording, at the same instants of all, or from one recording on. `durations`: of the recordings [s].
     """
     rows = []
     scopes = [(float(place), length) for place, length in enumerate(durations)]

@@ -32,14 +32,12 @@ FEWEST_CYCLES = 1.5
 CYCLES_A_STEP = 0.35  # step of the scan in cycles over the range of motion: a peak is two wide
 BAND_SHARE = 0.8  # share of the band up to which the frequency at typical speed may reach
 MOST_ORDERS = 220
-
 # Spread of steps, relative to one, up to which they are even: over a thousand orders no phase is off by as much.
 EVEN = 1e-9
 # Factor up to which orders are looked at where something is left: they reach the band near reversals only, in a
 # twentieth of the time of a sine.
 FARTHER = 8.0
 MOST_FARTHER_ORDERS = 800
-
 FEW = 2  # orders at once up to which sines are kept: one of a fit, and the two of its difference quotient
 KEPT = 24 * THREADS  # sets of them that are kept a piece: those of a model with all orders that it may have
 

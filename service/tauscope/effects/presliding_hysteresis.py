@@ -23,10 +23,8 @@ RESOLVED = 4.0
 def bristle_deflection(position: Array, lengths: Array, start: Array) -> Array:
     """Deflection z of Dahl bristles along a motion, -1 … 1.
 
-    `position`: (N,), q [rad or m].
-    `lengths`: (g,), x_s [rad or m].
-    `start`: (g,), z at the first sample.
-    Returns (g, N), z; exact between samples of one direction.
+    `position`: (N,), q [rad or m]; `lengths`: (g,), x_s [rad or m]; `start`: (g,), z at the first sample. Returns (g,
+    N), z; exact between samples of one direction.
     """
     step = np.diff(position)
     direction = np.sign(step)

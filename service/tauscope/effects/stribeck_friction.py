@@ -11,7 +11,6 @@ from tauscope.robot import Robot
 
 SPEEDS = np.array([0.04, 0.08, 0.15, 0.25, 0.4, 0.65, 1.0])  # decay speeds looked at, relative to the joint's top speed
 EXPONENTS = np.array([1.0, 2.0])
-
 # Least K_v v_s: where friction has not risen to half its size before it decays, step and decay together are any small
 # bump, and s is of any size.
 SHORTEST_DECAY = 1.0

@@ -78,9 +78,8 @@ class TimeLocalEffect(Effect):
 def open_share(shapes: Array, recording: int, time: Array, interval_s: float) -> Array:
     """w(t) of windows, (N,): 1 where one is open, the part of an interval at the samples that its edges cut.
 
-    `shapes`: (..., k), scope, start [s], end [s], profile: of one window, or of one a sample.
-    `time`: instants, from the beginning of the recording [s].
-    `interval_s`: what one instant stands for [s].
+    `shapes`: (..., k), scope, start [s], end [s], profile: of one window, or of one a sample; `time`: instants, from
+    the beginning of the recording [s]; `interval_s`: what one instant stands for [s].
     """
     scope, start, end, profile = np.moveaxis(shapes[..., :4], -1, 0)
     first = np.where(scope < EVERY, -2.0 - scope, np.inf)  # the recording in which it opens for good

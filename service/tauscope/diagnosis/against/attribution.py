@@ -22,41 +22,24 @@ from tauscope.dynamics.base_parameters import BaseParameters
 from tauscope.effects.carried_body import FARTHEST_M
 from tauscope.recording.recording import Array
 
-AS_GOOD = 3.0
-"""Log odds within which another change is an equivalent explanation: one in twenty."""
-
-PROGRESS = 1e-3
-"""Gain in log probability from which an exchange is one."""
-
-UNLIKELY = 1e-3
-"""Chance of what is left, below which more may be wrong than steps of one change find."""
-
-MOST_OF_IT = 0.7
-"""Part of what makes the surplus significant that a body at the tool takes at least."""
-
-MOST_MOVES = 100
-"""Additions and exchanges, at most."""
+AS_GOOD = 3.0  # log odds within which another change is an equivalent explanation: one in twenty
+PROGRESS = 1e-3  # gain in log probability from which an exchange is one
+UNLIKELY = 1e-3  # chance of what is left, below which more may be wrong than steps of one change find
+MOST_OF_IT = 0.7  # part of what makes the surplus significant that a body at the tool takes at least
+MOST_MOVES = 100  # additions and exchanges, at most
 
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """One change of a link with its most probable values.
-
-    `values`: (k,), β.
-    `covariance`: (k, k), of β, beside all other changes.
-    `effect`: (m,), what it changes of the base parameters.
-    `gain`: what it takes off the surplus [variances].
-    `log_odds`: posterior, that it is there.
-    `equivalent`: changes that explain as much in its place.
-    """
+    """One change of a link with its most probable values."""
 
     change: LinkChange
-    values: Array
-    covariance: Array
-    effect: Array
-    gain: float
-    log_odds: float
-    equivalent: tuple[LinkChange, ...]
+    values: Array  # (k,), β
+    covariance: Array  # (k, k), of β, beside all other changes
+    effect: Array  # (m,), what it changes of the base parameters
+    gain: float  # what it takes off the surplus [variances]
+    log_odds: float  # posterior, that it is there
+    equivalent: tuple[LinkChange, ...]  # changes that explain as much in its place
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,11 +138,9 @@ class _Set:
 class Attribution:
     """A surplus of base parameters that is to be explained by links.
 
-    `base`: of the arm.
-    `surplus`: (m,), real less stated base parameters.
-    `covariance`: (m, m), C.
-    `links`: (10 n,), stated standard parameters; None where only their base parameters are known.
-    `believed`: (10 n, 10 n), covariance believed of them.
+    `base`: of the arm; `surplus`: (m,), real less stated base parameters; `covariance`: (m, m), C; `links`: (10 n,),
+    stated standard parameters; None where only their base parameters are known; `believed`: (10 n, 10 n), covariance
+    believed of them.
     """
 
     def __init__(
@@ -243,10 +224,7 @@ class Attribution:
         return found
 
     def part(self, change: LinkChange, values: Array) -> _Part:
-        """A change at its values.
-
-        `values`: (k,), β.
-        """
+        """A change at its values. `values`: (k,), β."""
         columns = self.columns[change.link]
         return _Part(change, values, columns @ change.change(values), columns @ change.slope(values))
 

@@ -48,33 +48,22 @@ def payload_finding(diagnosis: Diagnosis, carried: Explanation) -> Finding:
     )
 
 
-CHANCE = 0.01
-"""Chance of calling any parameter wrong where all are right."""
-
-NEGLIGIBLE = 1e-3
-"""Part of the larger value below which two values are the same for all purposes."""
-
-LACKED = 0.02
-"""Part of the real value below which a simulator's own estimate of a term says that it has none."""
-
-CLEAR = 3.0
-"""Standard errors from which an effect has another size in the simulator than on the arm."""
-
+CHANCE = 0.01  # chance of calling any parameter wrong where all are right
+NEGLIGIBLE = 1e-3  # part of the larger value below which two values are the same for all purposes
+LACKED = 0.02  # part of the real value below which a simulator's own estimate of a term says that it has none
+CLEAR = 3.0  # standard errors from which an effect has another size in the simulator than on the arm
 TERMS = ("stiction", "stribeck", "viscous", "offset")
 
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """A model that recordings are compared with.
-
-    `lacking`: joint indices and nominal terms that it does not have.
-    `covariance`: (p, p), of the values, in the columns of the diagnosed model; None where they are exact.
-    `links`: (10 n,), standard parameters of its links; None where only their base parameters are known.
-    """
+    """A model that recordings are compared with."""
 
     values: Mapping[str, float]
-    lacking: tuple[tuple[int, str], ...] = ()
+    lacking: tuple[tuple[int, str], ...] = ()  # joint indices and nominal terms that it does not have
+    # (p, p), of the values, in the columns of the diagnosed model; None where they are exact
     covariance: Array | None = None
+    # (10 n,), standard parameters of its links; None where only their base parameters are known
     links: Array | None = None
 
 

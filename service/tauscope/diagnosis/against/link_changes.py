@@ -19,39 +19,29 @@ SIZE = len(STANDARD_PARAMETERS)
 MASS = STANDARD_PARAMETERS.index("m")
 MOMENTS = slice(MASS + 1, SIZE)
 INERTIAS = slice(0, MASS)
-
 AXES = ("x", "y", "z")
+# Names of the ten standard parameters, in their order.
 QUANTITIES = (
     *(f"inertia_{name[1:]}" for name in STANDARD_PARAMETERS[INERTIAS]),
     "mass",
     *(f"first_moment_{axis}" for axis in AXES),
 )
-"""Names of the ten standard parameters, in their order."""
-
 UNITS = (*["kg m²"] * 6, "kg", *["kg m"] * 3)
-
+# Distance from a link's origin at which things are fixed to it, as a weak prior where torque does not show it [m].
 USUAL_M = 0.3
-"""Distance from a link's origin at which things are fixed to it, as a weak prior where torque does not show it [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinkChange:
-    """One way in which the parameters of a link can be wrong.
-
-    `quantities`: names of the changed quantities.
-    `spread`: (k,), standard deviations believed of β.
-    `change`: x, the change (10,) of the standard parameters, from β (k,).
-    `is_linear`: whether x is linear in β.
-    `stated_mass`: mass of the link before the change [kg]; None where it is not known.
-    """
+    """One way in which the parameters of a link can be wrong."""
 
     link: int
-    quantities: tuple[str, ...]
-    spread: Array
-    change: Callable[[Array], Array]
-    is_linear: bool = True
+    quantities: tuple[str, ...]  # names of the changed quantities
+    spread: Array  # (k,), standard deviations believed of β
+    change: Callable[[Array], Array]  # x, the change (10,) of the standard parameters, from β (k,)
+    is_linear: bool = True  # whether x is linear in β
     is_point_mass: bool = False
-    stated_mass: float | None = None
+    stated_mass: float | None = None  # mass of the link before the change [kg]; None where it is not known
 
     @property
     def is_whole(self) -> bool:
@@ -59,17 +49,11 @@ class LinkChange:
         return self.quantities == QUANTITIES
 
     def is_possible(self, values: Array) -> bool:
-        """Whether the link keeps a positive mass; ten free numbers do not all mean what they say.
-
-        `values`: (k,), β.
-        """
+        """Whether the link keeps a positive mass; ten free numbers do not all mean what they say. `values`: (k,), β."""
         return self.is_whole or self.stated_mass is None or self.stated_mass + self.change(values)[MASS] >= 0.0
 
     def slope(self, values: Array) -> Array:
-        """∂x/∂β, (10, k), exact for polynomials of second degree.
-
-        `values`: (k,), β.
-        """
+        """∂x/∂β, (10, k), exact for polynomials of second degree. `values`: (k,), β."""
         steps = 1e-3 * np.diag(self.spread)
         pairs = [self.change(values + step) - self.change(values - step) for step in steps]
         return np.stack(pairs, axis=1) / (2e-3 * self.spread)

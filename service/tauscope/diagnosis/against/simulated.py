@@ -19,26 +19,18 @@ from tauscope.identification import Options, identify
 from tauscope.recording.conditioning import Conditioner
 from tauscope.recording.recording import Array, Recording
 
-PRESENT = 5.0
-"""Standard errors from which an effect is in the simulator's recordings…"""
-
-OF_REAL = 0.1
-"""…and the part of its size on the arm that it has at least."""
-
+PRESENT = 5.0  # standard errors from which an effect is in the simulator's recordings…
+OF_REAL = 0.1  # …and the part of its size on the arm that it has at least
 Place = tuple[str, int | None]
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedFit:
-    """What the simulator has.
+    """What the simulator has."""
 
-    `values`: (p,), nominal parameters in the columns of the final model.
-    `covariance`: (p, p), of these.
-    `shared`: effects and places that the simulator shows too, with their coefficients in the simulator and on the arm.
-    """
-
-    values: Array
-    covariance: Array
+    values: Array  # (p,), nominal parameters in the columns of the final model
+    covariance: Array  # (p, p), of these
+    # effects and places that the simulator shows too, with their coefficients in the simulator and on the arm
     shared: dict[Place, tuple[ParameterDifference, ...]]
 
 

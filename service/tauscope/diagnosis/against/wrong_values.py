@@ -12,17 +12,12 @@ from tauscope.diagnosis.findings.wrong_value import WrongQuantity, WrongValue
 from tauscope.recording.recording import Array
 from tauscope.robot import Joint, JointType
 
-CLEAR = 3.0
-"""Standard errors from which a quantity differs from its stated value."""
-
-NOTABLE = 0.1
-"""Part of a difference from which a change contributes to it."""
-
+CLEAR = 3.0  # standard errors from which a quantity differs from its stated value
+NOTABLE = 0.1  # part of a difference from which a change contributes to it
 JOINT_UNITS = {
     JointType.REVOLUTE: {"viscous": "Nm s/rad", "rotor_inertia": "kg m²"},
     JointType.PRISMATIC: {"viscous": "N s/m", "rotor_inertia": "kg"},
 }
-
 _CENTRE = tuple(f"centre_of_mass_{axis}" for axis in "xyz")
 
 
@@ -36,9 +31,8 @@ def attribute(
 ) -> tuple[ParameterDifference, ...]:
     """The differences, each with what explains it.
 
-    `names`: of the base parameters.
-    `links`: (10 n,), stated standard parameters; None where only their base parameters are known.
-    `several`: standard errors within which a difference is explained.
+    `names`: of the base parameters; `links`: (10 n,), stated standard parameters; None where only their base parameters
+    are known; `several`: standard errors within which a difference is explained.
     """
     places = {name: place for place, name in enumerate(names)}
     values = [

@@ -17,55 +17,37 @@ from tauscope.recording.conditioning.position_noise import encoder_step
 from tauscope.recording.link_encoders import LinkEncoders, find_link_encoders
 from tauscope.recording.samples import Array, Table
 
-LIGHT = 0.2
-"""Load, over its rms, below which teeth may be apart: errors of the load are of this size."""
+LIGHT = 0.2  # load, over its rms, below which teeth may be apart: errors of the load are of this size
 
 
 @dataclass(frozen=True, eq=False)
 class LinkRows:
-    """One joint's deflection and the states that may explain it, in the common band, (M,) each.
-
-    `deflection`: (M,), q - q_link [rad or m].
-    `load`: (M,), torque of the rigid body [Nm or N].
-    `side`: (M,), side of the teeth on which that load presses, -1 … 1.
-    `position`, `velocity`, `acceleration`: (M,), of the link.
-    `direction`: (M,), A(q̇), the smooth sign of the velocity.
-    `rigid`: (m, M), columns of the base parameters that make the load.
-    `inertia`: mean inertia of the link and all that it carries [kg m² or kg].
-    `resolution`: step or noise of the encoders [rad or m].
-    `rate_hz`: of the rows [Hz].
-    """
+    """One joint's deflection and the states that may explain it, in the common band, (M,) each."""
 
     recording: int
-    deflection: Array
-    load: Array
-    side: Array
-    position: Array
+    deflection: Array  # (M,), q - q_link [rad or m]
+    load: Array  # (M,), torque of the rigid body [Nm or N]
+    side: Array  # (M,), side of the teeth on which that load presses, -1 … 1
+    position: Array  # (M,), of the link; as are velocity and acceleration
     velocity: Array
     acceleration: Array
-    direction: Array
-    rigid: Array
-    inertia: float
-    resolution: float
-    rate_hz: float
+    direction: Array  # (M,), A(q̇), the smooth sign of the velocity
+    rigid: Array  # (m, M), columns of the base parameters that make the load
+    inertia: float  # mean inertia of the link and all that it carries [kg m² or kg]
+    resolution: float  # step or noise of the encoders [rad or m]
+    rate_hz: float  # of the rows [Hz]
 
     def stretches(self, length_s: float) -> NDArray[np.intp]:
-        """Number of the stretch of so many seconds that each row belongs to, (M,).
-
-        `length_s`: of a stretch [s].
-        """
+        """Number of the stretch of so many seconds that each row belongs to, (M,). `length_s`: of a stretch [s]."""
         return (np.arange(len(self.load)) / (self.rate_hz * length_s)).astype(np.intp)
 
 
 @dataclass(frozen=True, eq=False)
 class _LinkTable:
-    """Rows of a recording's table with the links' positions in the place of the motors', without what derives from q.
-
-    `lag`: (N, n), by how much each link lags its motor; zero at joints without an encoder on the link [rad or m].
-    """
+    """A recording's table with the links' positions in the place of the motors', without what derives from q."""
 
     source: Table
-    lag: Array
+    lag: Array  # (N, n), by how much each link lags its motor; zero at joints without an encoder on the link [rad or m]
     kept: NDArray[np.intp]
 
     @property
@@ -99,8 +81,7 @@ def link_rows(
 ) -> Iterator[tuple[int, LinkRows]]:
     """Joints that have an encoder on the link, with the rows of one recording, piece by piece.
 
-    `number`: index of the recording, from 0.
-    `cutoff_hz`: of the common band [Hz]; None for no filter.
+    `number`: index of the recording, from 0; `cutoff_hz`: of the common band [Hz]; None for no filter.
     """
     robot, structure = model.structure.robot, model.structure
     if not recording.has("qlink"):

@@ -21,68 +21,42 @@ from tauscope.recording import Recording
 from tauscope.recording.samples import Array
 from tauscope.robot import JointType
 
+# Believed spread of an encoder's error over a turn [rad], or over a metre [m]: 0.05 mm off centre at a radius of 50 mm.
 ECCENTRICITY = 1e-3
-"""Believed spread of an encoder's error over a turn [rad], or over a metre [m]: 0.05 mm off centre at a radius of
-50 mm."""
-
-DELAY_S = 5e-3
-"""Believed spread of the delay between two encoders of a joint [s]: some cycles of a bus."""
-
+DELAY_S = 5e-3  # believed spread of the delay between two encoders of a joint [s]: some cycles of a bus
+# Believed spread of the rotor's part in the inertia that a fit gives the link: motion alone cannot tell the two.
 ROTOR_SHARE = 0.3
-"""Believed spread of the rotor's part in the inertia that a fit gives the link: motion alone cannot tell the two."""
-
+# What the load errs by, relative to its size, beyond its parameters' covariance: the fit takes the transmission for
+# rigid. On simulated arms compliance and play are 0.2 to 4 % off.
 LOAD_ERROR = 0.03
-"""What the load errs by, relative to its size, beyond its parameters' covariance: the fit takes the transmission for
-rigid. On simulated arms compliance and play are 0.2 to 4 % off."""
-
+# Length of a stretch over which errors are alike [s]: friction, ripple and load errors keep their sign in it.
 STRETCH_S = 1.0
-"""Length of a stretch over which errors are alike [s]: friction, ripple and load errors keep their sign in it."""
-
-FEWEST_STRETCHES = 8
-"""Stretches from which a standard error means anything."""
-
+FEWEST_STRETCHES = 8  # stretches from which a standard error means anything
+# Mean side within the filter's kernel from which the teeth touch on one side: else the link may be in flight.
 SETTLED = 0.9
-"""Mean side within the filter's kernel from which the teeth touch on one side: else the link may be in flight."""
-
-FEWEST_REVERSALS = 3
-"""Stretches on either side of the teeth from which play is told from the encoders' offset."""
-
-HUBER = 1.5
-"""Residual from which a row counts less [standard deviations]: 96 % efficient under Gaussian noise."""
-
-MAD = 1.4826
-"""Standard deviation over the median of magnitudes, of Gaussian noise."""
-
-ROUNDS = 12
-"""Rounds of reweighting: they converge by a factor of two or more each."""
-
-CERTAIN = 5.0
-"""Standard errors from which a deflection is there: one of a million joints shows so much by chance."""
-
+FEWEST_REVERSALS = 3  # stretches on either side of the teeth from which play is told from the encoders' offset
+HUBER = 1.5  # residual from which a row counts less [standard deviations]: 96 % efficient under Gaussian noise
+MAD = 1.4826  # standard deviation over the median of magnitudes, of Gaussian noise
+ROUNDS = 12  # rounds of reweighting: they converge by a factor of two or more each
+CERTAIN = 5.0  # standard errors from which a deflection is there: one of a million joints shows so much by chance
+# Deflection over the encoders' resolution from which it is no error of theirs: motion averages within a count, but not
+# what repeats with the angle.
 RESOLVED = 0.3
-"""Deflection over the encoders' resolution from which it is no error of theirs: motion averages within a count, but
-not what repeats with the angle."""
 
 
 @dataclass(frozen=True)
 class MeasuredDeflection:
-    """What the encoder on a link says of its transmission.
-
-    `compliance`, `compliance_std`: c [rad/Nm or m/N].
-    `compliance_noise`: standard error of c as far as it decides whether there is any: what scales with c does not.
-    `play`, `play_std`: b [rad or m]; the error is infinite where the load does not change its side often enough.
-    `largest_load`: largest torque that was transmitted [Nm or N].
-    `resolution`: step or noise of the encoders: less is theirs and not the transmission's [rad or m].
-    """
+    """What the encoder on a link says of its transmission."""
 
     joint: int
-    compliance: float
-    compliance_std: float
+    compliance: float  # c [rad/Nm or m/N]
+    compliance_std: float  # of c
+    # standard error of c as far as it decides whether there is any: what scales with c does not
     compliance_noise: float
-    play: float
-    play_std: float
-    largest_load: float
-    resolution: float
+    play: float  # b [rad or m]
+    play_std: float  # of b; infinite where the load does not change its side often enough
+    largest_load: float  # largest torque that was transmitted [Nm or N]
+    resolution: float  # step or noise of the encoders: less is theirs and not the transmission's [rad or m]
 
     @property
     def least_compliance(self) -> float:
@@ -215,25 +189,18 @@ def _columns(pieces: Sequence[LinkRows], *, is_revolute: bool) -> tuple[Array, A
 
 @dataclass(frozen=True, eq=False)
 class _Regression:
-    """A robust fit.
+    """A robust fit."""
 
-    `values`: (k,), coefficients.
-    `covariance`: (k, k), of the coefficients, from the scores of stretches.
-    `solver`: (k, M), change of the coefficients for a change of each row.
-    """
-
-    values: Array
-    covariance: Array
-    solver: Array
+    values: Array  # (k,), coefficients
+    covariance: Array  # (k, k), of the coefficients, from the scores of stretches
+    solver: Array  # (k, M), change of the coefficients for a change of each row
 
 
 def _regress(columns: Array, rows: Array, spreads: Array, stretch: NDArray[np.intp]) -> _Regression:
     """Huber's regression.
 
-    `columns`: (M, k), of the regression.
-    `rows`: (M,), what they explain.
-    `spreads`: (k,), standard deviations believed of the coefficients.
-    `stretch`: (M,), number of the stretch that each row belongs to.
+    `columns`: (M, k), of the regression; `rows`: (M,), what they explain; `spreads`: (k,), standard deviations believed
+    of the coefficients; `stretch`: (M,), number of the stretch that each row belongs to.
     """
     prior, tiny = np.diag(spreads**-2.0), np.finfo(float).tiny
     weights, variance = np.ones(len(rows)), max(float(rows.var()), tiny)

@@ -13,13 +13,10 @@ from tauscope.effects.measured_deflection import MeasuredElasticity, MeasuredPla
 
 @dataclass(frozen=True, eq=False)
 class DirectTerm:
-    """A deflection that is certain.
-
-    `value`, `std`: of its coefficient [rad/Nm, rad, m/N or m].
-    """
+    """A deflection that is certain."""
 
     term: Term
-    value: float
+    value: float  # of its coefficient [rad/Nm, rad, m/N or m]
     std: float
 
     @property

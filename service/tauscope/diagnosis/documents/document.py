@@ -37,11 +37,8 @@ from tauscope.identification.warnings import excitation_warnings, extrapolation_
 from tauscope.recording.recording import Array
 from tauscope.result_warning import ResultWarning
 
-SHIFTS_FROM = 3.0
-"""Standard errors from which a parameter's shift is told."""
-
+SHIFTS_FROM = 3.0  # standard errors from which a parameter's shift is told
 UNKNOWN = "unknown"
-
 _WIDE = "record one motion through the whole range of positions and speeds, slow reversals included"
 
 

@@ -10,20 +10,14 @@ from tauscope.number_text import significant
 from tauscope.recording.recording import Array
 from tauscope.result_warning import ResultWarning
 
+# Standard parameters that are positive; a sum of such ones with positive weights is positive, too.
 POSITIVE = ("m", "Ixx", "Iyy", "Izz")
-"""Standard parameters that are positive; a sum of such ones with positive weights is positive, too."""
-
 POSITIVE_TERMS = ("stiction", "viscous", "rotor_inertia")
-
-CLEARLY = 2.0
-"""Standard errors below zero from which a value is worth a warning: nearer, it is zero."""
+CLEARLY = 2.0  # standard errors below zero from which a value is worth a warning: nearer, it is zero
 
 
 def impossible_places(structure: ModelStructure, parameters: Array) -> list[int]:
-    """Places of parameters below zero that must not be.
-
-    `parameters`: (p,), Θ.
-    """
+    """Places of parameters below zero that must not be. `parameters`: (p,), Θ."""
     places = [place for place, terms in enumerate(structure.base.terms) if _is_positive(terms)]
     joints = range(structure.robot.joint_count)
     terms = [structure.coefficient(joint, name) for joint in joints for name in POSITIVE_TERMS]

@@ -20,14 +20,9 @@ from tauscope.recording.recording import Array
 from tauscope.robot import JointType
 from tauscope.strict_model import ResultModel
 
-MOST_POINTS = 1500
-"""Points of one joint's residual, over all recordings."""
-
-FEWEST_POINTS = 150
-"""…and of one recording's, however many there are."""
-
+MOST_POINTS = 1500  # points of one joint's residual, over all recordings
+FEWEST_POINTS = 150  # …and of one recording's, however many there are
 BINS = 24
-
 VARIABLES = ("velocity", "position", "load", "acceleration")
 TIME = "time"
 

@@ -14,14 +14,9 @@ from tauscope.diagnosis.observations.whitening import JointNoise
 from tauscope.recording.recording import Array
 from tauscope.strict_model import ResultModel
 
-LONGEST_SEGMENT = 256
-"""Rows of one segment of Welch's method."""
-
-FEWEST = 32
-"""Rows of a repetition that is long enough to have a spectrum."""
-
-AVERAGED = 6
-"""Segments' worth of rows that a density is the mean of, where there are so many: fewer are mostly chance."""
+LONGEST_SEGMENT = 256  # rows of one segment of Welch's method
+FEWEST = 32  # rows of a repetition that is long enough to have a spectrum
+AVERAGED = 6  # segments' worth of rows that a density is the mean of, where there are so many: fewer are mostly chance
 
 
 class ResidualSpectrum(ResultModel):
@@ -64,10 +59,7 @@ def residual_spectra(diagnosis: Diagnosis) -> list[ResidualSpectrum]:
 def noise_density(noise: JointNoise, frequency: Array, rate_hz: float) -> Array:
     """One-sided density of a joint's noise, 2 σ² / (f_s |1 - Σ a_k e^{-iωk}|²).
 
-    `frequency`: (F,), [Hz].
-    `rate_hz`: rate of the rows, f_s [Hz].
-
-    Returns (F,), [(Nm)²/Hz or N²/Hz].
+    Returns (F,), [(Nm)²/Hz or N²/Hz]. `frequency`: (F,), [Hz]; `rate_hz`: rate of the rows, f_s [Hz].
     """
     polynomial = np.append(1.0, -noise.model.coefficients)
     _, response = signal.freqz(polynomial, worN=2.0 * np.pi * frequency / rate_hz)

@@ -10,36 +10,25 @@ from tauscope.diagnosis.findings.finding import FORMULA_ERROR, Finding
 from tauscope.effects import Effect, Quantity, TimeLocalEffect
 from tauscope.number_text import ABSENT, chance, significant, with_uncertainty
 
+# By verdict, where no finding leads.
 HEADLINES = {
     "consistent": "Nothing but noise is left: the model explains the recordings.",
     "unexplained": "Something is missing that no effect of the catalogue explains.",
     "inconclusive": "These recordings cannot decide whether anything is missing.",
     "wrong_values": "No physics is missing: the model states wrong values.",
 }
-"""By verdict, where no finding leads."""
-
-DEVIATIONS = 1.96
-"""Standard errors to either side: 95 % of a normal distribution."""
-
+DEVIATIONS = 1.96  # standard errors to either side: 95 % of a normal distribution
 MOST_NUMBERS = 4
-
-LIKELY = 0.5
-"""Probability from which a finding advises: below, something else is likelier."""
-
+LIKELY = 0.5  # probability from which a finding advises: below, something else is likelier
 UNLIKELY = "Something else is likelier: do not act on this alone"
-
-MOST_RIVALS = 2
-"""Equivalents named in a headline; a finding's entry has them all."""
+MOST_RIVALS = 2  # equivalents named in a headline; a finding's entry has them all
 
 
 @dataclass(frozen=True)
 class Statement:
-    """A finding in sentences.
+    """A finding in sentences."""
 
-    `headline`: the first of them, without its full stop.
-    """
-
-    headline: str
+    headline: str  # the first of them, without its full stop
     sentences: tuple[str, ...]
 
     @property
@@ -151,10 +140,7 @@ def change_text(relative: float, error: float | None) -> str:
 
 
 def state_unknown(joint: str, rms: float, unit: str) -> Statement:
-    """The statement of a mismatch without a name.
-
-    `rms`: beyond the noise [Nm or N].
-    """
+    """The statement of a mismatch without a name. `rms`: beyond the noise [Nm or N]."""
     headline = f"A mismatch of {significant(rms, 2)} {unit} rms at {joint} has no known cause ({chance(1.0)})"
     return Statement(headline, ("Look at the residual where it concentrates",))
 

@@ -10,8 +10,7 @@ from tauscope.diagnosis.observations.observations import Observations
 from tauscope.recording.recording import Array
 from tauscope.strict_model import ResultModel
 
-MOST_ROWS = 900
-"""Rows of one overlay: about two a pixel."""
+MOST_ROWS = 900  # rows of one overlay: about two a pixel
 
 
 class TorqueOverlay(ResultModel):

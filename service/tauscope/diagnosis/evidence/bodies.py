@@ -17,15 +17,10 @@ from tauscope.identification.consistency.triangle import UPPER_TRIANGLE, congrue
 from tauscope.identification.full_parameters import FullParameters
 from tauscope.recording.recording import Array
 
-WITHIN = 0.9
-"""Part of the way to the nearest body without volume that one step may take."""
-
+WITHIN = 0.9  # part of the way to the nearest body without volume that one step may take
+# Least part of the believed body's moments that a body keeps along every axis: with its square double numbers work.
 THINNEST = 1e-6
-"""Least part of the believed body's moments that a body keeps along every axis: with its square double numbers work."""
-
-ROUNDING = 1e-10
-"""Least eigenvalue of a correlation matrix that rounding may have made negative."""
-
+ROUNDING = 1e-10  # least eigenvalue of a correlation matrix that rounding may have made negative
 _ROWS, _COLUMNS = np.array(UPPER_TRIANGLE).T
 _WEIGHT = np.where(_ROWS == _COLUMNS, 1.0, np.sqrt(2.0))
 _TRIANGLE = triangle_of_parameters()
@@ -33,42 +28,28 @@ _TRIANGLE = triangle_of_parameters()
 
 @dataclass(frozen=True, eq=False)
 class NormalBodies:
-    """The prior about one body, as normal distribution of the base parameters Θ_L = M x.
+    """The prior about one body, as normal distribution of the base parameters Θ_L = M x."""
 
-    `centre`: (10 n,), of the links' standard parameters.
-    `gain`: (10 n, m), dx/dΘ_L of the most probable links.
-    `mean`, `precision`: (m,), (m, m), of the base parameters.
-    `energy`: -2 log p of the body, but for a constant.
-    `log_mass`: log of the probability that the normal distribution stands for, alike: expanded elsewhere it is another.
-    """
-
-    centre: Array
-    gain: Array
-    mean: Array
-    precision: Array
-    energy: float
+    centre: Array  # (10 n,), of the links' standard parameters
+    gain: Array  # (10 n, m), dx/dΘ_L of the most probable links
+    mean: Array  # (m,), of the base parameters
+    precision: Array  # (m, m), of the base parameters
+    energy: float  # -2 log p of the body, but for a constant
+    # log of the probability that the normal distribution stands for, alike: expanded elsewhere it is another
     log_mass: float
 
     def links(self, base: Array) -> Array:
-        """Most probable standard parameters of links with these base parameters, (10 n,).
-
-        `base`: (m,), Θ_L.
-        """
+        """Most probable standard parameters of links with these base parameters, (10 n,). `base`: (m,), Θ_L."""
         return self.centre + self.gain @ (base - self.mean)
 
 
 @dataclass(frozen=True, eq=False)
 class BodyPrior:
-    """The prior itself.
+    """The prior itself."""
 
-    `base`: (m, 10 n), M.
-    `mean`: (10 n,), μ.
-    `precision`: (10 n, 10 n), WᵀW.
-    """
-
-    base: Array
-    mean: Array
-    precision: Array
+    base: Array  # (m, 10 n), M
+    mean: Array  # (10 n,), μ
+    precision: Array  # (10 n, 10 n), WᵀW
 
     @staticmethod
     def of(identification: Identification) -> "BodyPrior":
@@ -79,10 +60,7 @@ class BodyPrior:
         return BodyPrior(full.map[: full.base_count, :links], prior.mean[:links], root.T @ root)
 
     def start(self, links: Array) -> Array:
-        """Bodies with some volume near given ones, which may have none.
-
-        `links`: (10 n,), standard parameters.
-        """
+        """Bodies with some volume near given ones, which may have none. `links`: (10 n,), standard parameters."""
         near = WITHIN * links + (1.0 - WITHIN) * self.mean
         for own in _each(near):
             if np.linalg.eigvalsh(pseudo_inertia(near[own]))[0] <= 0.0:
@@ -90,10 +68,7 @@ class BodyPrior:
         return near
 
     def about(self, links: Array) -> NormalBodies:
-        """The prior to second order about bodies.
-
-        `links`: (10 n,), standard parameters of bodies with volume.
-        """
+        """The prior to second order about bodies. `links`: (10 n,), standard parameters of bodies with volume."""
         precision, slope = self.precision.copy(), self.precision @ (links - self.mean)
         for own in _each(links):
             inverse = np.asarray(np.linalg.inv(pseudo_inertia(links[own])), dtype=np.float64)
@@ -129,10 +104,7 @@ class BodyPrior:
 
 
 def pseudo_inertia(parameters: Array) -> Array:
-    """J of one link, (4, 4).
-
-    `parameters`: (10,), its standard parameters.
-    """
+    """J of one link, (4, 4). `parameters`: (10,), its standard parameters."""
     values = (_TRIANGLE @ parameters) / _WEIGHT
     found = np.empty((4, 4))
     found[_ROWS, _COLUMNS] = found[_COLUMNS, _ROWS] = values

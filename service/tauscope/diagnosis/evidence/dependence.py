@@ -16,24 +16,16 @@ from numpy.typing import NDArray
 
 from tauscope.recording.recording import Array
 
-ORDER = 8
-"""Predecessors that a row may resemble: with three, the edge of a low pass doubles κ of white noise behind it."""
-
-RIDGE = 0.01
-"""Part of the rows' power that is added to the autocovariance at lag 0, so that κ stays finite."""
-
-BROKEN = 1.5
-"""Time between two rows, in usual ones, from which the second does not follow the first."""
+ORDER = 8  # predecessors that a row may resemble: with three, the edge of a low pass doubles κ of white noise behind it
+RIDGE = 0.01  # part of the rows' power that is added to the autocovariance at lag 0, so that κ stays finite
+BROKEN = 1.5  # time between two rows, in usual ones, from which the second does not follow the first
 
 
 @dataclass(frozen=True, eq=False)
 class Succession:
-    """Which rows of a joint follow one another.
+    """Which rows of a joint follow one another."""
 
-    `bounds`: first row of each unbroken stretch, and the row after its last.
-    """
-
-    bounds: tuple[tuple[int, int], ...]
+    bounds: tuple[tuple[int, int], ...]  # first row of each unbroken stretch, and the row after its last
 
     @staticmethod
     def of(recording: NDArray[np.intp], instants: Array) -> "Succession":

@@ -15,42 +15,26 @@ from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.recording.recording import Array
 
+# Which of position, speed and direction each kind of discrepancy depends on: speed, position, both.
 COORDINATES = np.array([[0.0, 1.0, 1.0], [1.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
-"""Which of position, speed and direction each kind of discrepancy depends on: speed, position, both."""
-
-FEATURES = (24, 24, 60)
-"""Features of each kind."""
-
-LENGTH = 1.0 / 1.5
-"""Length over which the torque changes, relative to half the range of motion."""
-
+FEATURES = (24, 24, 60)  # features of each kind
+LENGTH = 1.0 / 1.5  # length over which the torque changes, relative to half the range of motion
+# Slope at which the direction turns, at most, relative to the top speed: no corner is sharper than the motion.
 SHARPEST = 20.0
-"""Slope at which the direction turns, at most, relative to the top speed: no corner is sharper than the motion."""
-
-DIRECTION = 1e-6
-"""Singular values of the scaled columns below this share of the largest are no direction."""
-
-GROUP = np.repeat(np.arange(len(FEATURES)), FEATURES)
-"""Kind of each feature."""
-
+DIRECTION = 1e-6  # singular values of the scaled columns below this share of the largest are no direction
+GROUP = np.repeat(np.arange(len(FEATURES)), FEATURES)  # kind of each feature
+# Singular values of the features of a kind below this share of the largest are none: a millionth of its power.
 RESOLVED = 1e-3
-"""Singular values of the features of a kind below this share of the largest are none: a millionth of its power."""
-
-SEED = 20
-"""Of the frequencies and phases: the same recordings get the same features."""
+SEED = 20  # of the frequencies and phases: the same recordings get the same features
 
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """Range of every joint's motion.
+    """Range of every joint's motion."""
 
-    `middle`, `half`: (n,), middle and half width of the positions [rad or m].
-    `top`: (n,), speed that one row in fifty exceeds [rad/s or m/s].
-    """
-
-    middle: Array
-    half: Array
-    top: Array
+    middle: Array  # (n,), of the positions [rad or m]
+    half: Array  # (n,), half width of the positions
+    top: Array  # (n,), speed that one row in fifty exceeds [rad/s or m/s]
 
     @staticmethod
     def of(observations: Observations) -> "Reach":
@@ -67,10 +51,7 @@ class Reach:
 def smooth_features(
     observations: Observations, model: ExtendedModel, joint: int, reach: Reach
 ) -> tuple[Array, NDArray[np.intp]]:
-    """White rows of the features of one joint, (b, R), and the kind of each, (b,).
-
-    `joint`: joint index, from 0.
-    """
+    """White rows of the features of one joint, (b, R), and the kind of each, (b,)."""
     draws = np.random.default_rng(SEED)
     frequency = draws.standard_normal((len(GROUP), 3)) * COORDINATES[GROUP] / LENGTH
     phase = draws.uniform(0.0, 2.0 * np.pi, len(GROUP))
@@ -95,10 +76,7 @@ def smooth_features(
 
 
 def _find_principal(features: Array) -> Array:
-    """Fewer features of the same covariance, (c, R).
-
-    `features`: (b, R), white rows.
-    """
+    """Fewer features of the same covariance, (c, R). `features`: (b, R), white rows."""
     _, sizes, directions = np.linalg.svd(features, full_matrices=False)
     kept = sizes > RESOLVED * sizes.max(initial=0.0)
     return np.asarray(sizes[kept, None] * directions[kept])
@@ -107,8 +85,7 @@ def _find_principal(features: Array) -> Array:
 def beyond(columns: Array, features: Array) -> Array:
     """Features without what columns can make, (b, R).
 
-    `columns`: (k, R), white columns of the nominal model.
-    `features`: (b, R), white rows.
+    `columns`: (k, R), white columns of the nominal model; `features`: (b, R), white rows.
     """
     length = np.linalg.norm(columns, axis=1, keepdims=True)
     unit = columns / np.where(length > 0.0, length, 1.0)

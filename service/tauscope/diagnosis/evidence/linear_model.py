@@ -20,35 +20,22 @@ from tauscope.diagnosis.evidence.moments import Index, JointMoments, Weighted, f
 from tauscope.diagnosis.evidence.scales import Scales
 from tauscope.recording.recording import Array
 
-STEPS = 30
-"""Most steps to the most probable scales of a joint."""
-
-SETTLED = 0.02
-"""Change of the log evidence at which a step is the last."""
-
-CERTAIN = 1e6
-"""Factor by which a parameter that is held is believed more precisely."""
+STEPS = 30  # most steps to the most probable scales of a joint
+SETTLED = 0.02  # change of the log evidence at which a step is the last
+CERTAIN = 1e6  # factor by which a parameter that is held is believed more precisely
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Mean and covariance of the parameters, and the log evidence.
+    """Mean and covariance of the parameters, and the log evidence."""
 
-    `mean`: (p,), of Θ.
-    `factor`: (p, p), lower Cholesky factor of A / (s sᵀ).
-    `scale`: (p,), s.
-    """
-
-    mean: Array
-    factor: Array
-    scale: Array
+    mean: Array  # (p,), of Θ
+    factor: Array  # (p, p), lower Cholesky factor of A / (s sᵀ)
+    scale: Array  # (p,), s
     log_evidence: float
 
     def solve(self, right: Array) -> Array:
-        """A⁻¹ r.
-
-        `right`: (p,) or (p, k), r.
-        """
+        """A⁻¹ r. `right`: (p,) or (p, k), r."""
         scale = self.scale if right.ndim == 1 else self.scale[:, None]
         return np.asarray(cho_solve((self.factor, True), right / scale) / scale)
 
@@ -67,15 +54,11 @@ class Posterior:
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """Rows of all joints, and what is believed of the parameters.
-
-    `mean`: (p,), μ.
-    `precision`: (p, p), P.
-    """
+    """Rows of all joints, and what is believed of the parameters."""
 
     joints: tuple[JointMoments, ...]
-    mean: Array
-    precision: Array
+    mean: Array  # (p,), μ
+    precision: Array  # (p, p), P
 
     @property
     def size(self) -> int:
@@ -99,8 +82,7 @@ class LinearModel:
     def hold(self, places: Index, values: Array) -> "LinearModel":
         """The same with some parameters believed to have a value.
 
-        `places`: (c,), their places among all.
-        `values`: (c,), those values.
+        `places`: (c,), their places among all; `values`: (c,), those values.
         """
         precision, right = self.precision.copy(), self.precision @ self.mean
         certain = CERTAIN * np.diag(self.precision)[places]
@@ -111,8 +93,7 @@ class LinearModel:
     def without(self, places: Index, values: Array) -> "LinearModel":
         """The same with some parameters held at a value; their places stay, with no column.
 
-        `places`: (c,), their places among all.
-        `values`: (c,), what they are held at.
+        `places`: (c,), their places among all; `values`: (c,), what they are held at.
         """
         return replace(self, joints=tuple(own.without(places, values) for own in self.joints))
 
@@ -129,7 +110,6 @@ class LinearModel:
     ) -> tuple[Scales, ...]:
         """The scales of highest evidence at some joints, one joint after the other.
 
-        `joints`: joint indices, from 0.
         `anew`: whether to look also from a covariance without discrepancy: one optimum has what another has not.
         """
         found = list(scales)

@@ -12,20 +12,14 @@ from tauscope.effects.computation import LastFew
 from tauscope.recording.recording import Array
 
 Index = NDArray[np.intp]
-
-ROUNDING = 1e-12
-"""Added to the diagonal of a correlation matrix: what rounding takes off it."""
-
-
-KEPT = 2
-"""Scales whose products are kept: many hypotheses ask for the same."""
+ROUNDING = 1e-12  # added to the diagonal of a correlation matrix: what rounding takes off it
+KEPT = 2  # scales whose products are kept: many hypotheses ask for the same
 
 
 def factor(matrix: Array, scale: Array) -> Array:
     """Lower Cholesky factor of a matrix whose rows are divided by their scale, (p, p).
 
-    `matrix`: (p, p), positive definite but for rounding.
-    `scale`: (p,), root of its diagonal.
+    `matrix`: (p, p), positive definite but for rounding; `scale`: (p,), root of its diagonal.
     """
     correlation = matrix / np.outer(scale, scale) + ROUNDING * np.eye(len(scale))
     return np.asarray(np.linalg.cholesky(correlation), dtype=np.float64)
@@ -33,40 +27,25 @@ def factor(matrix: Array, scale: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Weighted:
-    """A joint's rows under scales.
+    """A joint's rows under scales."""
 
-    `products`: (1 + k, 1 + k), Zᵀ C⁻¹ Z of target and columns.
-    `log_determinant`: log det C.
-    `whole`: (1 + k + b, 1 + k + b), Zᵀ W Z with W = 1 / σ² D.
-    `half`: (b, 1 + k), K^(-1/2) A Bᵀ W Z of target and columns, K = 1 + A Bᵀ W B A.
-    `root`: (b, b), K^(1/2).
-    """
-
-    products: Array
-    log_determinant: float
-    whole: Array
-    half: Array
-    root: Array
+    products: Array  # (1 + k, 1 + k), Zᵀ C⁻¹ Z of target and columns
+    log_determinant: float  # log det C
+    whole: Array  # (1 + k + b, 1 + k + b), Zᵀ W Z with W = 1 / σ² D
+    half: Array  # (b, 1 + k), K^(-1/2) A Bᵀ W Z of target and columns, K = 1 + A Bᵀ W B A
+    root: Array  # (b, b), K^(1/2)
 
 
 @dataclass(frozen=True, eq=False)
 class JointMoments:
-    """Rows Z = [target; columns; features] of one joint, in classes of rest, and their products in each class.
+    """Rows Z = [target; columns; features] of one joint, in classes of rest, and their products in each class."""
 
-    `index`: (k,), places of the columns among all parameters.
-    `rows`: (1 + k + b, R), white rows.
-    `bounds`: (K + 1,), where each class begins.
-    `products`: (K, 1 + k + b, 1 + k + b), Z Zᵀ of each class.
-    `counts`: (K,), independent rows of each class; one that tells less than a whole one counts as a part.
-    `groups`: (b,), group of each feature; -1 for a column error of known size.
-    """
-
-    index: Index
-    rows: Array
-    bounds: Index
-    products: Array
-    counts: Array
-    groups: Index
+    index: Index  # (k,), places of the columns among all parameters
+    rows: Array  # (1 + k + b, R), white rows
+    bounds: Index  # (K + 1,), where each class begins
+    products: Array  # (K, 1 + k + b, 1 + k + b), Z Zᵀ of each class
+    counts: Array  # (K,), independent rows of each class; one that tells less than a whole one counts as a part
+    groups: Index  # (b,), group of each feature; -1 for a column error of known size
     _known: LastFew[bytes, Weighted] = field(default_factory=lambda: LastFew(KEPT), init=False)
 
     @staticmethod
@@ -96,8 +75,7 @@ class JointMoments:
     def extend(self, index: Index, columns: Array) -> "JointMoments":
         """The same with columns of more parameters.
 
-        `index`: (c,), their places among all parameters.
-        `columns`: (c, R), white rows.
+        `index`: (c,), their places among all parameters; `columns`: (c, R), white rows.
         """
         crossed, mutual = self.against(columns[None])
         at, count = self.visible, len(columns)
@@ -124,8 +102,7 @@ class JointMoments:
     def without(self, places: Index, values: Array) -> "JointMoments":
         """The same with some parameters held at a value.
 
-        `places`: (c,), their places among all parameters.
-        `values`: (c,), what they are held at.
+        `places`: (c,), their places among all parameters; `values`: (c,), what they are held at.
         """
         held = np.isin(self.index, places)
         value_of = dict(zip(places.tolist(), values.tolist(), strict=True))
@@ -154,10 +131,7 @@ class JointMoments:
         return Weighted(whole[:visible, :visible] - half.T @ half, determinant, whole, half, root)
 
     def discrepancy(self, scales: Scales, direction: Array) -> Array:
-        """Most probable torque without a name, (R,).
-
-        `direction`: (1 + k,), 1, then minus the columns' parameters.
-        """
+        """Most probable torque without a name, (R,). `direction`: (1 + k,), 1, then minus the columns' parameters."""
         known = self.weighted(scales)
         seen = solve_triangular(known.root, known.half @ direction, lower=True, trans="T")
         return np.asarray((scales.amplitudes(self.groups) * seen) @ self.rows[self.visible :])
@@ -178,8 +152,7 @@ class JointMoments:
     def slopes(self, scales: Scales, direction: Array, covariance: Array) -> Array:
         """Slopes of uᵀ Z C⁻¹ Zᵀ u + tr(V X C⁻¹ Xᵀ) + log det C in each of the scales, (s,).
 
-        `direction`: (1 + k,), u.
-        `covariance`: (k, k), V, of the columns' parameters.
+        `direction`: (1 + k,), u; `covariance`: (k, k), V, of the columns' parameters.
         """
         visible, weights, counts = self.visible, scales.weights(), self.counts
         amplitudes = scales.amplitudes(self.groups)

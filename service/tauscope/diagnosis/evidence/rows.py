@@ -23,42 +23,27 @@ from tauscope.effects import Effect, Signals
 from tauscope.effects.computation import THREADS, LastFew
 from tauscope.recording.recording import Array
 
-REVERSAL = 2.0
-"""Speed in widths 1/K_v of friction's step below which a joint is near rest."""
-
-UNCERTAIN = 3.0
-"""…or in standard deviations of the velocity's noise, where that is more."""
-
-OPEN = 1.0
-"""Part of the power of a step's error that a row is held to be off by: all of it."""
-
-AROUND_STOP = 1
-"""Rows on either side of a stop that share its samples."""
-
-
+REVERSAL = 2.0  # speed in widths 1/K_v of friction's step below which a joint is near rest
+UNCERTAIN = 3.0  # …or in standard deviations of the velocity's noise, where that is more
+OPEN = 1.0  # part of the power of a step's error that a row is held to be off by: all of it
+AROUND_STOP = 1  # rows on either side of a stop that share its samples
+# Moments that are kept a joint: those of the hypothesis at hand, and of another that differs from it there.
 MOMENTS_KEPT = 2 * THREADS
-"""Moments that are kept a joint: those of the hypothesis at hand, and of another that differs from it there."""
 
 
 @dataclass(frozen=True, eq=False)
 class EvidenceRows:
-    """White rows of every joint in order of their class of rest.
-
-    `order`: tuple of (R_j,), which of the white rows count, class by class.
-    `certain`: tuple of (R_j,), weight of each of them beside friction's step, whose place the velocity's noise leaves
-    open.
-    `bounds`: tuple of (K + 1,), where each class begins.
-    `features`: tuple of (b_j, R_j), discrepancy, then errors that all reversals share, in order of time.
-    `groups`: tuple of (b_j,), kind of each; -1 for an error.
-    """
+    """White rows of every joint in order of their class of rest."""
 
     observations: Observations
     white: WhiteColumns
-    order: tuple[NDArray[np.intp], ...]
+    order: tuple[NDArray[np.intp], ...]  # tuple of (R_j,), which of the white rows count, class by class
+    # tuple of (R_j,), weight of each of them beside friction's step, whose place the velocity's noise leaves open
     certain: tuple[Array, ...]
-    bounds: tuple[NDArray[np.intp], ...]
+    bounds: tuple[NDArray[np.intp], ...]  # tuple of (K + 1,), where each class begins
+    # tuple of (b_j, R_j), discrepancy, then errors that all reversals share, in order of time
     features: tuple[Array, ...]
-    groups: tuple[NDArray[np.intp], ...]
+    groups: tuple[NDArray[np.intp], ...]  # tuple of (b_j,), kind of each; -1 for an error
     successions: tuple[Succession, ...]
     _known: LastFew[tuple[object, ...], tuple[ExtendedModel, JointMoments]] = field(init=False)
 
@@ -101,9 +86,7 @@ class EvidenceRows:
     def take(self, joint: int, rows: Array, dependence: float) -> Array:
         """The rows of a joint that count, as much as they tell, in order of their class, (…, R_j).
 
-        `joint`: joint index, from 0.
-        `rows`: (…, R), white rows.
-        `dependence`: κ.
+        `rows`: (…, R), white rows; `dependence`: κ.
         """
         return rows[..., self.order[joint]] * (self.certain[joint] / np.sqrt(dependence))
 
@@ -131,10 +114,7 @@ class EvidenceRows:
     ) -> JointMoments:
         """Those of one joint, with a discrepancy beyond the columns of the first parameters.
 
-        `joint`: joint index, from 0.
-        `residual`: (R,), white rows.
-        `dependence`: κ.
-        `plain`: number of parameters that the discrepancy leaves alone.
+        `residual`: (R,), white rows; `dependence`: κ; `plain`: number of parameters that the discrepancy leaves alone.
         """
         columns, smooth = self.take(joint, linear.rows, dependence), self.groups[joint] >= 0
         features = self.take(joint, self.features[joint], dependence)
@@ -147,11 +127,7 @@ class EvidenceRows:
         return JointMoments.of(linear.index, target, columns, features, self.bounds[joint], counts, self.groups[joint])
 
     def dependence(self, joint: int, left: Array) -> float:
-        """κ of what a model leaves beside its discrepancy.
-
-        `joint`: joint index, from 0.
-        `left`: (R_j,), in order of class.
-        """
+        """κ of what a model leaves beside its discrepancy. `left`: (R_j,), in order of class."""
         rows, moving = np.zeros(self.features[joint].shape[1]), self.bounds[joint][1]
         rows[self.order[joint][:moving]] = left[:moving]
         return self.successions[joint].dependence(rows)
@@ -176,10 +152,7 @@ class EvidenceRows:
 
 
 def find_rest(observations: Observations, model: ExtendedModel, joint: int) -> tuple[Array, NDArray[np.intp]]:
-    """Share of every white row's samples near rest, (R,), and which stop it is of, from 1, or 0 for none, (R,).
-
-    `joint`: joint index, from 0.
-    """
+    """Share of every white row's samples near rest, (R,), and which stop it is of, from 1, or 0 for none, (R,)."""
     order = observations.noise[joint].order if observations.noise else 0
     kept = observations.kept(joint)
     near = np.concatenate([_measure_rest(piece, model, joint)[order:] for piece in observations])
@@ -194,7 +167,6 @@ def find_rest(observations: Observations, model: ExtendedModel, joint: int) -> t
 def weigh_rows(observations: Observations, model: ExtendedModel, joint: int, noise: float = 1.0) -> Array:
     """How much every white row of a joint tells beside friction's step and at stops, (R,).
 
-    `joint`: joint index, from 0.
     `noise`: σ of the rows, relative to white noise.
     """
     _, stops = find_rest(observations, model, joint)

@@ -7,46 +7,24 @@ from numpy.typing import NDArray
 
 from tauscope.recording.recording import Array
 
-GROUPS = 3
-"""Kinds of discrepancy: of speed, of position, of both."""
-
-REST_SHARES = np.array([0.0, 0.15, 0.5, 1.0])
-"""Share of a row's samples near rest by which a class of rows counts."""
-
-REST_BOUNDS = (0.02, 0.3, 0.7)
-"""Shares that part the classes."""
-
-NOISE_SPREAD = 1.5
-"""Standard deviation of log σ about the noise that was estimated before."""
-
-REPEATED_SPREAD = 0.1
-"""…where repetitions of the motion tell it."""
-
-REST_SPREAD = 2.0
-"""Standard deviation of log r about…"""
-
-REST = -1.0
-"""…friction near rest that is known to about a third of the noise."""
-
-LEAST = 1e-3
-"""Amplitude of a discrepancy, relative to what the plain model leaves, below which it is none."""
-
-LIMIT = 9.0
-"""Magnitude that no logarithm of a scale exceeds."""
+GROUPS = 3  # kinds of discrepancy: of speed, of position, of both
+REST_SHARES = np.array([0.0, 0.15, 0.5, 1.0])  # share of a row's samples near rest by which a class of rows counts
+REST_BOUNDS = (0.02, 0.3, 0.7)  # shares that part the classes
+NOISE_SPREAD = 1.5  # standard deviation of log σ about the noise that was estimated before
+REPEATED_SPREAD = 0.1  # …where repetitions of the motion tell it
+REST_SPREAD = 2.0  # standard deviation of log r about…
+REST = -1.0  # …friction near rest that is known to about a third of the noise
+LEAST = 1e-3  # amplitude of a discrepancy, relative to what the plain model leaves, below which it is none
+LIMIT = 9.0  # magnitude that no logarithm of a scale exceeds
 
 
 @dataclass(frozen=True, eq=False)
 class Scales:
-    """Logarithms of the scales of one joint's covariance C = σ² (1 + r² c²) + Σ_g a_g² B_g B_gᵀ.
+    """Logarithms of the scales of one joint's covariance C = σ² (1 + r² c²) + Σ_g a_g² B_g B_gᵀ."""
 
-    `values`: (2 + G,), log σ, log a_g of every group, log r; in units of white noise.
-    `level`: rms of what the plain model leaves, white.
-    `noise_spread`: standard deviation of log σ about the noise that was estimated before.
-    """
-
-    values: Array
-    level: float
-    noise_spread: float = NOISE_SPREAD
+    values: Array  # (2 + G,), log σ, log a_g of every group, log r; in units of white noise
+    level: float  # rms of what the plain model leaves, white
+    noise_spread: float = NOISE_SPREAD  # standard deviation of log σ about the noise that was estimated before
 
     @staticmethod
     def start(level: float, *, repeated: bool = False) -> "Scales":
@@ -74,17 +52,14 @@ class Scales:
     def amplitudes(self, groups: NDArray[np.intp]) -> Array:
         """Amplitude of each feature; 1 for an error of known size, group -1.
 
-        `groups`: (b,), group of each feature.
-
-        Returns (b,), amplitudes.
+        Returns (b,), amplitudes. `groups`: (b,), group of each feature.
         """
         return np.where(groups < 0, 1.0, np.exp(self.values[1:-1])[groups])
 
     def collect(self, by_class: Array, by_feature: Array, groups: NDArray[np.intp]) -> Array:
         """Slopes in the logarithms, (2 + G,).
 
-        `by_class`: (K,), slope in the variance of each class.
-        `by_feature`: (b,), slope in log a of each feature.
+        `by_class`: (K,), slope in the variance of each class; `by_feature`: (b,), slope in log a of each feature;
         `groups`: (b,), group of each feature.
         """
         rest = np.exp(2.0 * self.values[-1]) * REST_SHARES**2
@@ -104,10 +79,7 @@ class Scales:
         return np.array([noise, *np.exp(2.0 * self.values[1:-1]) / self.level**2, rest])
 
     def without_discrepancy(self, noise: float) -> "Scales":
-        """The same with no discrepancy and another noise.
-
-        `noise`: σ.
-        """
+        """The same with no discrepancy and another noise. `noise`: σ."""
         values = self.values.copy()
         values[0], values[1:-1] = np.log(noise), np.log(LEAST * self.level)
         return Scales(values, self.level, self.noise_spread)

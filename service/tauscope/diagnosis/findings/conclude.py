@@ -28,8 +28,7 @@ from tauscope.effects.plain_terms import TorqueOffset
 from tauscope.identification import Identification
 from tauscope.recording.recording import Array
 
-LEVEL = 0.01
-"""Chance that anything is named where nothing is missing, for limits of detection."""
+LEVEL = 0.01  # chance that anything is named where nothing is missing, for limits of detection
 
 
 def conclude(identification: Identification, searched: Searched) -> Diagnosis:

@@ -16,15 +16,10 @@ from tauscope.diagnosis.fitting.fit import Fit, Fitter
 from tauscope.diagnosis.fitting.projection import JointColumns
 from tauscope.recording.recording import Array
 
-LEVEL = 1e-4
-"""Chance at which parameters are said to have moved."""
-
+LEVEL = 1e-4  # chance at which parameters are said to have moved
 MOST_SHOWN = 8
-SHOWN_FROM = 4.0
-"""Standard errors from which a parameter is named."""
-
-KNOWN = 1e-8
-"""Singular values of a group's column-scaled factor, relative to the largest, that count as information."""
+SHOWN_FROM = 4.0  # standard errors from which a parameter is named
+KNOWN = 1e-8  # singular values of a group's column-scaled factor, relative to the largest, that count as information
 
 
 @dataclass(frozen=True)

@@ -15,37 +15,28 @@ from tauscope.effects import Effect, Signals
 from tauscope.effects.computation import side_by_side
 from tauscope.effects.plain_terms import PlainTerm
 
-POWER = 0.9
-"""Chance at which an effect of the smallest size is found."""
+POWER = 0.9  # chance at which an effect of the smallest size is found
 
 
 @dataclass(frozen=True)
 class Detectable:
-    """The smallest effect that would have been named.
-
-    `joint`: joint index, from 0.
-    `minimum`: size of the first coefficient [unit]; None where nothing shows it.
-    """
+    """The smallest effect that would have been named."""
 
     effect: str
-    joint: int | None
-    minimum: float | None
+    joint: int | None  # joint index, from 0
+    minimum: float | None  # size of the first coefficient [unit]; None where nothing shows it
     unit: str
     visible: bool
 
 
 @dataclass(frozen=True)
 class Visibility:
-    """How much a form of an effect shows beside a fitted model.
-
-    `information`: energy of its first column for a size of one, at a usual shape; zero where it does not show [noise
-    variances].
-    `shapes_tried`: effective number of shapes among which chance may choose.
-    """
+    """How much a form of an effect shows beside a fitted model."""
 
     effect: Effect
+    # energy of its first column for a size of one, at a usual shape; zero where it does not show [noise variances]
     information: float
-    shapes_tried: float
+    shapes_tried: float  # effective number of shapes among which chance may choose
 
     def needed_strength(self, level: float) -> float:
         """Noncentrality λ at which the form is significant with probability `POWER`."""

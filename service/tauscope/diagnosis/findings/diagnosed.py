@@ -21,23 +21,19 @@ from tauscope.identification.warnings import extrapolations, undetermined
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
+# Energy that findings take off a joint's residual, in noise variances, from which there was something to explain.
 EXPLAINED = 20.0
-"""Energy that findings take off a joint's residual, in noise variances, from which there was something to explain."""
 
 
 @dataclass(frozen=True)
 class ParameterDifference:
-    """One parameter that a simulation has wrong.
-
-    `simulation`, `real`: its values [SI].
-    `explained_by`: quantities of links or joints that explain the difference.
-    """
+    """One parameter that a simulation has wrong."""
 
     parameter: str
-    simulation: float
+    simulation: float  # value [SI]
     real: float
     std: float
-    explained_by: tuple[WrongValue, ...] = ()
+    explained_by: tuple[WrongValue, ...] = ()  # quantities of links or joints that explain the difference
 
     @property
     def in_std(self) -> float:
@@ -55,12 +51,7 @@ class Selection:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What was found.
-
-    `tentative`: what held-out motion refutes; no part of the model, and it turns no verdict.
-    `noise_std`: (n,), torque noise a sample at the recorded rate [Nm or N].
-    `cutoff_hz`: band of the comparison [Hz].
-    """
+    """What was found."""
 
     identification: Identification
     setting: ArmContext
@@ -73,15 +64,15 @@ class Diagnosis:
     detectable: tuple[Detectable, ...]
     before: FitSizes
     after: FitSizes
-    noise_std: Array
+    noise_std: Array  # (n,), torque noise a sample at the recorded rate [Nm or N]
     pure_error: bool
     level: float
-    cutoff_hz: float
+    cutoff_hz: float  # band of the comparison [Hz]
     fitter: Fitter
     held_out: Unseen | None
     against: Literal["identified", "model", "simulation"] = "identified"
     differences: tuple[ParameterDifference, ...] = ()
-    tentative: tuple[Finding, ...] = ()
+    tentative: tuple[Finding, ...] = ()  # what held-out motion refutes; no part of the model, and it turns no verdict
 
     @property
     def robot(self) -> Robot:

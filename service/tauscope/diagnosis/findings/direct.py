@@ -13,11 +13,8 @@ from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.findings.finding import Finding
 from tauscope.effects.measured_deflection import MeasuredElasticity, MeasuredPlay
 
-NO_SHAPE = np.zeros((0, 0))
-"""Covariance of what no fit estimates."""
-
-AGREED = 3.0
-"""Standard errors by which held-out motion may show another size."""
+NO_SHAPE = np.zeros((0, 0))  # covariance of what no fit estimates
+AGREED = 3.0  # standard errors by which held-out motion may show another size
 
 
 def with_direct_findings(

@@ -13,11 +13,8 @@ from scipy import stats
 from tauscope.diagnosis.fitting.projection import INVISIBLE, Moments
 from tauscope.recording.recording import Array
 
-DRAWS = 5000
-"""Draws: 250 of them lie beyond."""
-
-TAIL = 0.05
-"""Share of the draws that lie beyond where the tails are compared."""
+DRAWS = 5000  # draws: 250 of them lie beyond
+TAIL = 0.05  # share of the draws that lie beyond where the tails are compared
 
 
 def effective_number(found: Moments, columns: Mapping[int, Array], rng: np.random.Generator) -> float:

@@ -13,25 +13,19 @@ from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.search.found import Rival
 from tauscope.recording.recording import Array
 
+# Log odds within which data do not tell two effects apart: a small error of the columns decides between them.
 EQUIVALENT = 5.0
-"""Log odds within which data do not tell two effects apart: a small error of the columns decides between them."""
-
+# Part of an effect's log odds that counts as nothing between two laws: no formula is exactly that of an arm.
 FORMULA_ERROR = 0.05
-"""Part of an effect's log odds that counts as nothing between two laws: no formula is exactly that of an arm."""
 
 
 @dataclass(frozen=True, eq=False)
 class FitSizes:
-    """Rms of the torque residual at the recorded rate, no filter.
+    """Rms of the torque residual at the recorded rate, no filter."""
 
-    `train`: (n,), on the recordings that the model was made from [Nm or N].
-    `held_out`: (n,), on recordings that were not used.
-    `stretches`: (n, S), squared errors there, summed over stretches of motion [Nm² or N²].
-    """
-
-    train: Array
-    held_out: Array | None
-    stretches: Array | None = None
+    train: Array  # (n,), on the recordings that the model was made from [Nm or N]
+    held_out: Array | None  # (n,), on recordings that were not used
+    stretches: Array | None = None  # (n, S), squared errors there, summed over stretches of motion [Nm² or N²]
 
     @staticmethod
     def of(model: ExtendedModel, rows: Observations, unseen: Observations | None) -> "FitSizes":
@@ -46,23 +40,17 @@ class FitSizes:
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """Effects of one kind at one place: one term, or several orders of a periodic torque.
-
-    `covariances`: tuple of (k, k), of each term's coefficients and shapes, in the arm's own torque
-    (`model.torque_scale`).
-    `gain`: energy of the residual that they explain beside all other findings [noise variances].
-    `alternatives`: effects that these data cannot tell from it.
-    `confirmed`: by motion that was not used; None where there was none.
-    """
+    """Effects of one kind at one place: one term, or several orders of a periodic torque."""
 
     terms: tuple[Term, ...]
+    # tuple of (k, k), of each term's coefficients and shapes, in the arm's own torque (`model.torque_scale`)
     covariances: tuple[Array, ...]
-    gain: float
+    gain: float  # energy of the residual that they explain beside all other findings [noise variances]
     probability: float
     before: FitSizes
     after: FitSizes
-    alternatives: tuple[Rival, ...] = ()
-    confirmed: bool | None = None
+    alternatives: tuple[Rival, ...] = ()  # effects that these data cannot tell from it
+    confirmed: bool | None = None  # by motion that was not used; None where there was none
     in_model: bool = True
 
     @property

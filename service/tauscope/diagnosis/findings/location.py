@@ -16,25 +16,18 @@ from tauscope.effects import Signals
 from tauscope.recording.recording import Array
 
 BINS = 12
-WINDOW = 3
-"""Neighbouring bins that make a place."""
-
-CONCENTRATED = 0.45
-"""Share of the excess within `WINDOW` of `BINS` equally full bins from which it has a place."""
-
+WINDOW = 3  # neighbouring bins that make a place
+CONCENTRATED = 0.45  # share of the excess within `WINDOW` of `BINS` equally full bins from which it has a place
+# The variable of effects that follow a recorded temperature: they show at both ends of its range.
 THERMAL = "temperature"
-"""The variable of effects that follow a recorded temperature: they show at both ends of its range."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """A range of a variable in which excess residual concentrates.
-
-    `low`, `high`: the range [SI].
-    """
+    """A range of a variable in which excess residual concentrates."""
 
     variable: str
-    low: float
+    low: float  # [SI]
     high: float
     share: float
     recording: str | None = None
@@ -42,16 +35,11 @@ class Place:
 
 @dataclass(frozen=True)
 class JointMismatch:
-    """Excess residual of one joint.
+    """Excess residual of one joint."""
 
-    `joint`: joint index, from 0.
-    `excess_rms`: root of what the residual's power exceeds the noise's by, in the common band [Nm or N].
-    `explained`: what the findings take off the whitened residual's energy [noise variances].
-    """
-
-    joint: int
-    excess_rms: float
-    explained: float
+    joint: int  # joint index, from 0
+    excess_rms: float  # root of what the residual's power exceeds the noise's by, in the common band [Nm or N]
+    explained: float  # what the findings take off the whitened residual's energy [noise variances]
     place: Place | None
     time: Place | None
 

@@ -23,9 +23,7 @@ from tauscope.effects.plain_terms import CoulombFriction, PlainTerm, StribeckTer
 from tauscope.robot import Robot
 
 PLAIN: tuple[type[PlainTerm], ...] = (CoulombFriction, StribeckTerm, ViscousFriction, TorqueOffset)
-
-Lacking = Collection[tuple[int, str]]
-"""Joint indices and names of the nominal terms that the given model does not have."""
+Lacking = Collection[tuple[int, str]]  # joint indices and names of the nominal terms that the given model does not have
 
 
 def undeclared_offsets(diagnosis: Diagnosis) -> Lacking:

@@ -7,8 +7,7 @@ from tauscope.diagnosis.fitting.fit import Fitter
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.observations.observations import Observations
 
-PREDICTED = 4.0
-"""Power of a held-out residual, in noise variances, up to which a model predicts the motion."""
+PREDICTED = 4.0  # power of a held-out residual, in noise variances, up to which a model predicts the motion
 
 
 @dataclass(frozen=True, eq=False)

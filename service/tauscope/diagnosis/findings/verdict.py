@@ -15,27 +15,22 @@ class Verdict(StrEnum):
     WRONG_VALUES = "wrong_values"
 
 
+# Verdicts that leave something to another recording.
 OPEN = frozenset({Verdict.PARTLY_EXPLAINED, Verdict.UNEXPLAINED, Verdict.INCONCLUSIVE})
-"""Verdicts that leave something to another recording."""
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the verdict rests on.
-
-    `extrapolates`: whether held-out motion is beyond what training excites.
-    `undetermined`: whether training leaves a part of its torque open.
-    `wrong_values`: whether a model that the recordings are compared with states wrong values.
-    """
+    """What the verdict rests on."""
 
     findings: int
     misfit_before: bool
     misfit_after: bool
     parameters_hold: bool
     predicts: bool = True
-    extrapolates: bool = False
-    undetermined: bool = False
-    wrong_values: bool = False
+    extrapolates: bool = False  # whether held-out motion is beyond what training excites
+    undetermined: bool = False  # whether training leaves a part of its torque open
+    wrong_values: bool = False  # whether a model that the recordings are compared with states wrong values
 
 
 def verdict(evidence: Evidence) -> Verdict:

@@ -13,8 +13,7 @@ from tauscope.diagnosis.model.term import Term
 from tauscope.effects.torque_gain_error import TorqueGainError
 from tauscope.identification.signs import CLEARLY
 
-OPPOSITE = np.array([-2.0])
-"""Gain g of 1 + g = -1."""
+OPPOSITE = np.array([-2.0])  # gain g of 1 + g = -1
 
 
 def with_wrong_signs(diagnosis: Diagnosis, joints: Sequence[int]) -> Diagnosis:

@@ -5,21 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+# Quantities that no body and no friction has below zero; what is printed is possible.
 NEVER_NEGATIVE = frozenset({"mass", "inertia_xx", "inertia_yy", "inertia_zz", "stiction", "viscous"})
-"""Quantities that no body and no friction has below zero; what is printed is possible."""
 
 
 @dataclass(frozen=True)
 class WrongQuantity:
-    """One number of a link or a joint.
-
-    `simulation`: stated value [SI]; None where only a difference is known.
-    `value`: value on the arm, or the difference [SI].
-    """
+    """One number of a link or a joint."""
 
     name: str
-    simulation: float | None
-    value: float
+    simulation: float | None  # stated value [SI]; None where only a difference is known
+    value: float  # value on the arm, or the difference [SI]
     std: float
     unit: str
 
@@ -39,26 +35,17 @@ class WrongQuantity:
 
 @dataclass(frozen=True)
 class WrongValue:
-    """Numbers of one link or one joint that explain differences of parameters.
+    """Numbers of one link or one joint that explain differences of parameters."""
 
-    `link`, `joint`: index, from 0; one of them is None.
-    `explains`: differences that it explains, alone or with others.
-    `among`: all differences.
-    `equivalent`: other quantities that explain as much.
-    """
-
-    link: int | None
-    joint: int | None
+    link: int | None  # index, from 0; None where it is a joint's
+    joint: int | None  # index, from 0; None where it is a link's
     quantities: tuple[WrongQuantity, ...]
-    explains: int = 0
-    among: int = 0
-    equivalent: tuple[str, ...] = ()
+    explains: int = 0  # differences that it explains, alone or with others
+    among: int = 0  # all differences
+    equivalent: tuple[str, ...] = ()  # other quantities that explain as much
 
     def statement(self, joints: Sequence[str]) -> str:
-        """One sentence.
-
-        `joints`: names of the joints.
-        """
+        """One sentence. `joints`: names of the joints."""
         place = f"link {self.link + 1}" if self.link is not None else joints[self.joint or 0]
         first, *others = self.quantities
         text = f"{_title(first.name)} of {place} {first.words}"

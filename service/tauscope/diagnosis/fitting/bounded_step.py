@@ -18,8 +18,8 @@ from scipy.optimize import lsq_linear
 
 from tauscope.recording.recording import Array
 
+# Part of a curved parameter's variance that is added to it, so that two that are one can be solved for.
 NEGLIGIBLE = 1e-12
-"""Part of a curved parameter's variance that is added to it, so that two that are one can be solved for."""
 
 
 def bounded_step(
@@ -27,11 +27,9 @@ def bounded_step(
 ) -> Array:
     """The step that takes most off the energy within its limits, (p,).
 
-    `step`: (p,), without limits.
-    `spread`: (p, r), S with S Sᵀ the parameters' covariance.
-    `curved`: (k,), places of the parameters that are limited.
-    `lower`, `upper`: (k,), how far they may go, lower ≤ 0 ≤ upper.
-    `reach`: (k,), how far of the same order each may go, above zero.
+    `step`: (p,), without limits; `spread`: (p, r), S with S Sᵀ the parameters' covariance; `curved`: (k,), places of
+    the parameters that are limited; `lower`, `upper`: (k,), how far they may go, lower ≤ 0 ≤ upper; `reach`: (k,), how
+    far of the same order each may go, above zero.
     """
     wanted = step[curved] / reach
     low, high = lower / reach, upper / reach

@@ -15,37 +15,25 @@ from tauscope.diagnosis.observations.observations import Observations
 from tauscope.recording.recording import Array
 
 STEPS = 25
+# Energy that a step takes or promises to take off, below which there is none to follow [noise variances].
 SETTLED = 0.05
-"""Energy that a step takes or promises to take off, below which there is none to follow [noise variances]."""
-
-LARGEST_LOG_STEP = 0.4
-"""Change of a constant's logarithm in one step."""
-
-SHAPE_STEP = 0.15
-"""Change of a linear shape parameter in one step, relative to its bounds."""
-
+LARGEST_LOG_STEP = 0.4  # change of a constant's logarithm in one step
+SHAPE_STEP = 0.15  # change of a linear shape parameter in one step, relative to its bounds
+# Parts of those changes that are tried, one after the other, until less is left than before.
 TRUSTED = (1.0, 0.25, 0.06, 0.015)
-"""Parts of those changes that are tried, one after the other, until less is left than before."""
-
+# Factor beyond which a constant of the friction curve does not move from where the identification found it.
 FARTHEST = 3.0
-"""Factor beyond which a constant of the friction curve does not move from where the identification found it."""
-
-AT_LIMIT = 1e-6
-"""Part of its largest step within which a constant or a shape is at its limit."""
+AT_LIMIT = 1e-6  # part of its largest step within which a constant or a shape is at its limit
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """An extended model at its optimum.
-
-    `energy`: Σ r² that the model leaves, the prior's included [noise variances].
-    `spread`: (p, r), square root of the covariance; a shape at its bound is as uncertain as if there were none.
-    """
+    """An extended model at its optimum."""
 
     model: ExtendedModel
     projection: Projection
-    energy: float
-    spread: Array
+    energy: float  # Σ r² that the model leaves, the prior's included [noise variances]
+    spread: Array  # (p, r), square root of the covariance; a shape at its bound is as uncertain as if there were none
 
     @property
     def covariance(self) -> Array:
@@ -69,13 +57,10 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A model as it is.
-
-    `residual`: list of (R_j,), what it leaves, whitened.
-    """
+    """A model as it is."""
 
     model: ExtendedModel
-    residual: list[Array]
+    residual: list[Array]  # list of (R_j,), what it leaves, whitened
 
     @property
     def energy(self) -> float:

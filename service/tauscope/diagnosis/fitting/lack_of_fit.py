@@ -17,32 +17,22 @@ from tauscope.effects.computation import side_by_side
 from tauscope.recording.recording import Array
 
 FEATURES = 60
-HATS = 12
-"""Hat functions of time in every recording."""
-
-MEASURABLE = 1.0
-"""Standard errors of the noise's power, as repetitions tell it, that a mismatch exceeds it by."""
-
+HATS = 12  # hat functions of time in every recording
+MEASURABLE = 1.0  # standard errors of the noise's power, as repetitions tell it, that a mismatch exceeds it by
+# Singular value of the features beside a model, of unit length each, below which there is no direction of its own,
+# relative to the largest.
 DIRECTION = 1e-3
-"""Singular value of the features beside a model, of unit length each, below which there is no direction of its own,
-relative to the largest."""
-
-LEVEL = 1e-3
-"""Chance, over all joints and both tests, at which a mismatch is called significant."""
+LEVEL = 1e-3  # chance, over all joints and both tests, at which a mismatch is called significant
 
 
 @dataclass(frozen=True, eq=False)
 class LackOfFit:
-    """What is left.
+    """What is left."""
 
-    `omnibus`, `pure_error`: (n,), p-values; 1 where the test could not be made.
-    `excess`: (n,), Σ r² beyond the noise's, in noise variances, never negative.
-    `measurable`: (n,), the excess from which it exceeds what the noise's own power is uncertain by [noise variances].
-    """
-
-    omnibus: Array
-    pure_error: Array
-    excess: Array
+    omnibus: Array  # (n,), p-value; 1 where the test could not be made
+    pure_error: Array  # (n,), the same
+    excess: Array  # (n,), Σ r² beyond the noise's, in noise variances, never negative
+    # (n,), the excess from which it exceeds what the noise's own power is uncertain by [noise variances]
     measurable: Array
 
     @property
@@ -61,10 +51,7 @@ class LackOfFit:
 def lack_of_fit(
     fit: Fit, observations: Observations, dependence: Sequence[float] | None = None, *, pure_error: bool
 ) -> LackOfFit:
-    """Test what a model leaves.
-
-    `dependence`: number of rows of each joint that count as one; None where each does.
-    """
+    """Test what a model leaves. `dependence`: number of rows of each joint that count as one; None where each does."""
     joints = observations.robot.joint_count
     pure = np.ones(joints)
     excess, measurable = np.zeros(joints), np.zeros(joints)

@@ -17,39 +17,28 @@ from numpy.typing import NDArray
 
 from tauscope.recording.recording import Array
 
+# Singular values of the column-scaled nominal columns below this share of the largest are no direction.
 RANK_TOLERANCE = 1e-10
-"""Singular values of the column-scaled nominal columns below this share of the largest are no direction."""
-
+# Share of a candidate's energy outside the nominal columns below which no data of this kind can show it.
 INVISIBLE = 1e-7
-"""Share of a candidate's energy outside the nominal columns below which no data of this kind can show it."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointColumns:
-    """Whitened columns of one joint's rows.
+    """Whitened columns of one joint's rows."""
 
-    `index`: (k,), places among all parameters.
-    `rows`: (k, R), columns, time last.
-    """
-
-    index: NDArray[np.intp]
-    rows: Array
+    index: NDArray[np.intp]  # (k,), places among all parameters
+    rows: Array  # (k, R), columns, time last
 
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """A linear model fitted to whitened rows.
+    """A linear model fitted to whitened rows."""
 
-    `spread`: (p, r), S with S Sᵀ = (WᵀW)⁺: the parameters' covariance.
-    `basis`: tuple of (r, R_j), Qᵀ, joint by joint.
-    `residual`: tuple of (R_j,), what the model leaves.
-    `step`: (p,), the fitted parameters.
-    """
-
-    spread: Array
-    basis: tuple[Array, ...]
-    residual: tuple[Array, ...]
-    step: Array
+    spread: Array  # (p, r), S with S Sᵀ = (WᵀW)⁺: the parameters' covariance
+    basis: tuple[Array, ...]  # tuple of (r, R_j), Qᵀ, joint by joint
+    residual: tuple[Array, ...]  # tuple of (R_j,), what the model leaves
+    step: Array  # (p,), the fitted parameters
     prior_energy: float = 0.0
     independent: float | None = None
 
@@ -67,18 +56,12 @@ class Projection:
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """What is needed of a candidate's columns, for g shapes of c columns each.
+    """What is needed of a candidate's columns, for g shapes of c columns each."""
 
-    `target`: (g, c), Xᵀ r.
-    `gram`: (g, c, c), Xᵀ X after projection.
-    `shares`: (g, c), share of each column's energy that lies outside the nominal columns.
-    `inner`: (g, c, r), Xᵀ Q.
-    """
-
-    target: Array
-    gram: Array
-    shares: Array
-    inner: Array
+    target: Array  # (g, c), Xᵀ r
+    gram: Array  # (g, c, c), Xᵀ X after projection
+    shares: Array  # (g, c), share of each column's energy that lies outside the nominal columns
+    inner: Array  # (g, c, r), Xᵀ Q
 
 
 def project(

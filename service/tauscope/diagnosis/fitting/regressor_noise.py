@@ -35,19 +35,15 @@ from tauscope.recording.conditioning.common_band import Decimator
 from tauscope.recording.conditioning.filters import smooth
 from tauscope.recording.recording import Array
 
+# What is left of the motion's velocity without the upper half of its band shows what the band itself does.
 HALF_BAND = 0.5
-"""What is left of the motion's velocity without the upper half of its band shows what the band itself does."""
-
-ROUNDED = 0.8
-"""By which part of what half the band rounds a band itself may have rounded all reversals."""
-
+ROUNDED = 0.8  # by which part of what half the band rounds a band itself may have rounded all reversals
+# By which part of its period 1/f it may have moved them; the second where s f, up to which an encoder's steps s are
+# followed, is as wide as friction's step 1/K_v.
 MOVED = (0.03, 0.08)
-"""By which part of its period 1/f it may have moved them; the second where s f, up to which an encoder's steps s are
-followed, is as wide as friction's step 1/K_v."""
-
+# Part of u² that a row is held to be off by: on simulated arms that lack nothing, rows near reversals hold a twentieth
+# to a fifth of it; what a band does to all of them alike is looked at apart.
 REALISED = 0.15
-"""Part of u² that a row is held to be off by: on simulated arms that lack nothing, rows near reversals hold a twentieth
-to a fifth of it; what a band does to all of them alike is looked at apart."""
 
 
 def weightings_of_motion(observations: Observations, model: ExtendedModel) -> tuple[RowWeighting, ...]:
@@ -63,7 +59,6 @@ def weightings_of_motion(observations: Observations, model: ExtendedModel) -> tu
 def certainty(observations: Observations, model: ExtendedModel, joint: int, share: float) -> Array:
     """1 / √(1 + s u² / σ²) of every white row, (R,): how much it counts beside a step that is known to u.
 
-    `joint`: joint index, from 0.
     `share`: s, part of u² that a row is held to be off by.
     """
     noise = observations.noise[joint]
@@ -74,7 +69,6 @@ def certainty(observations: Observations, model: ExtendedModel, joint: int, shar
 def shared_errors(observations: Observations, model: ExtendedModel, joint: int, weights: Array) -> Array:
     """What the band may have made of all reversals alike, rounded and moved, among weighted rows, (2, R).
 
-    `joint`: joint index, from 0.
     `weights`: (R,), of the white rows.
     """
     changes, slopes = [], []

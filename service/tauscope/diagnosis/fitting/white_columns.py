@@ -18,17 +18,11 @@ from tauscope.effects import Effect, Signals
 from tauscope.effects.computation import THREADS, LastFew
 from tauscope.recording.recording import Array
 
+# Sets of friction columns that are kept a joint: those of the model at hand, and of the step that is tried.
 FRICTION_KEPT = 2 * THREADS
-"""Sets of friction columns that are kept a joint: those of the model at hand, and of the step that is tried."""
-
-TERMS_KEPT = 24 * THREADS
-"""Terms whose columns are kept: as many as two models have, and those that a step tried."""
-
-SHAPES_AT_ONCE = 48
-"""Shapes of an effect whose columns are made together: bounds memory."""
-
-OfJoints = dict[int, Array]
-"""White rows (…, R_j) of each joint that a term touches."""
+TERMS_KEPT = 24 * THREADS  # terms whose columns are kept: as many as two models have, and those that a step tried
+SHAPES_AT_ONCE = 48  # shapes of an effect whose columns are made together: bounds memory
+OfJoints = dict[int, Array]  # white rows (…, R_j) of each joint that a term touches
 
 
 class WhiteColumns:
@@ -79,10 +73,7 @@ class WhiteColumns:
         return _join(index, rows)
 
     def key(self, model: ExtendedModel, joint: int) -> tuple[object, ...]:
-        """All that the residual and the columns of a joint depend on.
-
-        `joint`: joint index, from 0.
-        """
+        """All that the residual and the columns of a joint depend on."""
         terms: list[object] = []
         for term, place in self._terms_at(model, joint):
             terms.append((_key(model, term), term.coefficients.tobytes(), place.start))
@@ -226,10 +217,7 @@ def _join(index: Sequence[int], rows: Sequence[Array]) -> JointColumns:
 def white_columns(
     observations: Observations, effect: Effect, shapes: Array, signals: Sequence[Signals]
 ) -> dict[int, Array]:
-    """Whitened columns (g, c, R_j) of an effect at every joint that it touches.
-
-    `shapes`: (g, k), shapes.
-    """
+    """Whitened columns (g, c, R_j) of an effect at every joint that it touches. `shapes`: (g, k), shapes."""
     touched = effect.touched(observations.robot.joint_count)
     rows: dict[int, list[Array]] = {joint: [] for joint in touched}
     count = 1

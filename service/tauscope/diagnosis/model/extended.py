@@ -14,35 +14,27 @@ from tauscope.identification.shape_sensitivity import ShapeParameter
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
+# Sets of signals that are kept a piece: those of the model at hand, of the step that is tried, and of one more.
 SIGNALS_KEPT = 3 * THREADS
-"""Sets of signals that are kept a piece: those of the model at hand, of the step that is tried, and of one more."""
-
-STEEPNESS_DIFFERENCE = 0.01
-"""Step of log K_v for the derivative of a term that has friction's step in it."""
-
+STEEPNESS_DIFFERENCE = 0.01  # step of log K_v for the derivative of a term that has friction's step in it
+# Relative standard error of a constant of the friction curve that the robot file states: it may be a guess.
 STATED_ERROR = 0.15
-"""Relative standard error of a constant of the friction curve that the robot file states: it may be a guess."""
 
 
 @dataclass(frozen=True, eq=False)
 class ExtendedModel:
-    """τ = W(K_v, δ) Θ + Σ effects.
-
-    `parameters`: (p,), Θ.
-    `links`: (10 n,), standard parameters of the nearest physically consistent links, for effects that need a whole
-    body.
-    `constants`: shape constants of the friction curve that are estimated along, as logarithms.
-    `stated`: for each of these the value that the robot file states, None where it states none.
-    `covariance`: (p, p), of Θ in a model that was saved; None where a fit has it, or nothing does.
-    """
+    """τ = W(K_v, δ) Θ + Σ effects."""
 
     structure: ModelStructure
-    parameters: Array
+    parameters: Array  # (p,), Θ
+    # (10 n,), standard parameters of the nearest physically consistent links, for effects that need a whole body
     links: Array
+    # shape constants of the friction curve that are estimated along, as logarithms
     constants: tuple[ShapeParameter, ...]
+    # for each of these the value that the robot file states, None where it states none
     stated: tuple[float | None, ...]
     terms: tuple[Term, ...] = ()
-    covariance: Array | None = None
+    covariance: Array | None = None  # (p, p), of Θ in a model that was saved; None where a fit has it, or nothing does
 
     @property
     def size(self) -> int:
@@ -88,10 +80,7 @@ class ExtendedModel:
         return replace(self, terms=())
 
     def slope_amplitudes(self, joint: int) -> tuple[list[int], Array]:
-        """Places of a joint's own estimated constants among all parameters, and the coefficients beside them, (k,).
-
-        `joint`: joint index, from 0.
-        """
+        """Places of a joint's own estimated constants among all parameters, and the coefficients beside them, (k,)."""
         places, amplitudes = [], []
         for place, (owner, name) in enumerate(self.constants):
             if owner == joint:
@@ -101,10 +90,7 @@ class ExtendedModel:
         return places, np.array(amplitudes)
 
     def slope_columns(self, piece: Piece, joint: int) -> Array:
-        """∂τ/∂log K of a joint's own estimated constants for coefficients of one, in the common band, (k, M).
-
-        `joint`: joint index, from 0.
-        """
+        """∂τ/∂log K of a joint's own estimated constants for coefficients of one, in the common band, (k, M)."""
         velocity = piece.prepared.motion.velocity[:, joint]
         values = [self.constant(place) for place, (owner, _) in enumerate(self.constants) if owner == joint]
         if not values:

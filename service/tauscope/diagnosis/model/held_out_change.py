@@ -16,20 +16,11 @@ import numpy as np
 
 from tauscope.recording.recording import Array
 
-STRETCHES = 24
-"""Stretches of motion: their spread, and so a standard error, is known to a seventh."""
-
-SHORTEST = 8
-"""Samples of a stretch, at least: errors of neighbouring samples are alike."""
-
-LOST = 2.0
-"""Standard errors from which a joint loses…"""
-
-SHOWN = 0.005
-"""…by a part of its rms that three digits show: a smaller loss changes no number that anybody reads."""
-
-SPILLED = 1.0 / 3.0
-"""Part of the gain of all joints that others may lose."""
+STRETCHES = 24  # stretches of motion: their spread, and so a standard error, is known to a seventh
+SHORTEST = 8  # samples of a stretch, at least: errors of neighbouring samples are alike
+LOST = 2.0  # standard errors from which a joint loses…
+SHOWN = 0.005  # …by a part of its rms that three digits show: a smaller loss changes no number that anybody reads
+SPILLED = 1.0 / 3.0  # part of the gain of all joints that others may lose
 
 
 def stretches(count: int) -> list[slice]:
@@ -39,24 +30,17 @@ def stretches(count: int) -> list[slice]:
 
 
 def sum_stretches(squares: Array) -> Array:
-    """Sums over stretches of motion, (n, S).
-
-    `squares`: (n, N), squared errors in the order of time.
-    """
+    """Sums over stretches of motion, (n, S). `squares`: (n, N), squared errors in the order of time."""
     return np.stack([squares[:, rows].sum(axis=1) for rows in stretches(squares.shape[1])], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOutChange:
-    """Change of what a model leaves of held-out motion.
+    """Change of what a model leaves of held-out motion."""
 
-    `relative`: (n,), of every joint's rms; below zero is better.
-    `error`: (n,), its standard error; infinite where the motion is too short to tell it.
-    `expected`: (n,), magnitude of the change in standard errors if all that the models differ in is there.
-    """
-
-    relative: Array
-    error: Array
+    relative: Array  # (n,), of every joint's rms; below zero is better
+    error: Array  # (n,), its standard error; infinite where the motion is too short to tell it
+    # (n,), magnitude of the change in standard errors if all that the models differ in is there
     expected: Array | None = None
 
     @staticmethod
@@ -106,9 +90,8 @@ class HeldOutChange:
 
         Where a torque f is there, leaving it out costs Σ f² ± 2σ √(κ Σ f²) in white noise σ whose rows count as 1/κ:
         the change expected is z_e = √(Σ f²/κ) / 2σ, and a change z has the likelihood ratio exp(2 z z_e). So the noise
-        need not be known, and luck that exceeds what the torque can do says no more than the torque would.
-
-        `joints`: that count, from 0.
+        need not be known, and luck that exceeds what the torque can do says no more than the torque would. `joints`:
+        that count, from 0.
         """
         size = np.abs(self.standard) if self.expected is None else np.minimum(np.abs(self.standard), self.expected)
         own = -2.0 * self.standard * size

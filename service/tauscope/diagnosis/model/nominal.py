@@ -15,8 +15,7 @@ from tauscope.recording.conditioning import Conditioner
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
-POSES = 200
-"""Of a motion, by which the mean of an inertia is told."""
+POSES = 200  # of a motion, by which the mean of an inertia is told
 
 
 def nominal_model(identification: Identification) -> ExtendedModel:
@@ -101,8 +100,7 @@ def setting_of(
 def mean_inertia(robot: Robot, bodies: Array, position: Array) -> Array:
     """Mean of the mass matrix's diagonal along a motion, not below zero, (n,) [kg m² or kg].
 
-    `bodies`: (10 n,), standard parameters.
-    `position`: (N, n), of the motion [rad or m].
+    `bodies`: (10 n,), standard parameters; `position`: (N, n), of the motion [rad or m].
     """
     poses = position[:: max(len(position) // POSES, 1)]
     diagonal = np.diagonal(mass_matrix(robot, bodies, poses), axis1=1, axis2=2)

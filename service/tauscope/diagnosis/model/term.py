@@ -5,25 +5,18 @@ from dataclasses import dataclass
 from tauscope.effects import Effect
 from tauscope.recording.recording import Array
 
+# Step of a shape parameter for its derivative, relative to its bounds or, where logarithmic, to itself.
 DIFFERENCE = 1e-3
-"""Step of a shape parameter for its derivative, relative to its bounds or, where logarithmic, to itself."""
-
-
-Place = tuple[str, int | None]
-"""Id of an effect, and index of its joint; None for an effect of the whole arm."""
+Place = tuple[str, int | None]  # id of an effect, and index of its joint; None for an effect of the whole arm
 
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """An effect in the model.
-
-    `shape`: (k,), values of its shape parameters.
-    `coefficients`: (c,), values of its coefficients.
-    """
+    """An effect in the model."""
 
     effect: Effect
-    shape: Array
-    coefficients: Array
+    shape: Array  # (k,), values of its shape parameters
+    coefficients: Array  # (c,), values of its coefficients
 
     @property
     def free_shapes(self) -> list[int]:

@@ -29,9 +29,7 @@ def on_the_arm(model: ExtendedModel, term: Term) -> Term:
 def covariance_on_the_arm(model: ExtendedModel, place: int, covariance: Array) -> Array:
     """Covariance of a term's parameters in the arm's own torque, that of the scale included, (k, k).
 
-    J C Jᵀ with J = ∂(c/f, shapes)/∂(all parameters): 1/f in c, -c/f² in f.
-
-    `covariance`: (p, p), of all its parameters.
+    J C Jᵀ with J = ∂(c/f, shapes)/∂(all parameters): 1/f in c, -c/f² in f. `covariance`: (p, p), of all its parameters.
     """
     places, term = model.term_places(), model.terms[place]
     slopes = np.eye(model.size)[places[place]]

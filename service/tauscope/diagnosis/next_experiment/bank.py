@@ -18,28 +18,15 @@ from tauscope.identification import Identification
 from tauscope.robot import FrictionCoefficients, Model, Robot
 from tauscope.trajectory import FourierSegment, FourierSeries, MotionSamples, Trajectory
 
-DURATION_S = 20.0
-"""Of every Fourier series and sweep [s]."""
-
+DURATION_S = 20.0  # of every Fourier series and sweep [s]
 WIDE = "a wide motion"
-
+# Period [s] and harmonics of the Fourier series.
 KINDS = {"a random motion": (10.0, 5), "a fast motion": (4.0, 4), WIDE: (10.0, 2)}
-"""Period [s] and harmonics of the Fourier series."""
-
-SWEEP_SHARES = (0.08, 0.3, 0.8)
-"""Speeds of sweeps, as part of the limit."""
-
+SWEEP_SHARES = (0.08, 0.3, 0.8)  # speeds of sweeps, as part of the limit
 SLOW_POSTURES = 3
-
-WIDEST_OF = 8
-"""Wide motions of which the one that crosses most of the position ranges is taken."""
-
-CHECKED = 2000
-"""Instants at which a motion's torque and range are looked at."""
-
-TAKEN_BACK = 0.75
-"""Factor by which a sweep that needs too much torque is slowed down."""
-
+WIDEST_OF = 8  # wide motions of which the one that crosses most of the position ranges is taken
+CHECKED = 2000  # instants at which a motion's torque and range are looked at
+TAKEN_BACK = 0.75  # factor by which a sweep that needs too much torque is slowed down
 MOST_TAKEN_BACK = 8
 
 

@@ -14,33 +14,23 @@ from tauscope.errors import ExcitationError
 from tauscope.recording.recording import Array
 from tauscope.trajectory import Trajectory
 
-FIRST_LOOK = 4
-"""Fourier series of every kind at the first look."""
-
-SECOND_LOOK = 8
-"""…and further ones of the best kind."""
-
+FIRST_LOOK = 4  # Fourier series of every kind at the first look
+SECOND_LOOK = 8  # …and further ones of the best kind
+# Separation λ that is aimed at, in variances of what is left. With 27, the difference of two scores, which varies by 2
+# √λ, exceeds with a chance of 95 % the 10 (`EQUIVALENT`) within which explanations are not told apart; noise of the
+# velocities takes some of it.
 SETTLING = 40.0
-"""Separation λ that is aimed at, in variances of what is left. With 27, the difference of two scores, which varies by
-2 √λ, exceeds with a chance of 95 % the 10 (`EQUIVALENT`) within which explanations are not told apart; noise of the
-velocities takes some of it."""
-
-LONGEST_S = 300.0
-"""No motion is repeated beyond this [s]."""
-
-MOST_OPTIONS = 4
-"""Explanations that are told apart, the likeliest ones."""
+LONGEST_S = 300.0  # no motion is repeated beyond this [s]
+MOST_OPTIONS = 4  # explanations that are told apart, the likeliest ones
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedExperiment:
-    """The next motion.
-
-    `separates`: effects and places that it tells apart; empty where it is to show more of everything.
-    """
+    """The next motion."""
 
     trajectory: Trajectory
     kind: str
+    # effects and places that it tells apart; empty where it is to show more of everything
     separates: tuple[tuple[str, int | None], ...]
     before: float
     after: float
@@ -133,17 +123,12 @@ class _Task:
 
 @dataclass(frozen=True, eq=False)
 class _Judge:
-    """What a motion is worth beside the recordings that there are.
+    """What a motion is worth beside the recordings that there are."""
 
-    `separates`: what is told apart.
-    `known`: tuple of (r, p + o), the same of the recordings.
-    `wanted`: (k,), parameters that are to be known better.
-    """
-
-    separates: tuple[tuple[str, int | None], ...]
+    separates: tuple[tuple[str, int | None], ...]  # what is told apart
     tasks: tuple[_Task, ...]
-    known: tuple[Array, ...]
-    wanted: Array
+    known: tuple[Array, ...]  # tuple of (r, p + o), the same of the recordings
+    wanted: Array  # (k,), parameters that are to be known better
     inflation: float
 
     def value(self, added: Sequence[Array] | None, times: int = 1) -> float:

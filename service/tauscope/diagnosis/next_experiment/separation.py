@@ -22,8 +22,7 @@ from tauscope.recording.conditioning.position_noise import PositionNoise
 from tauscope.recording.recording import Array
 from tauscope.trajectory import Trajectory
 
-UNKNOWN = 1e-9
-"""Singular values of the scaled columns below this share of the largest tell nothing."""
+UNKNOWN = 1e-9  # singular values of the scaled columns below this share of the largest tell nothing
 
 
 @dataclass(frozen=True, eq=False)

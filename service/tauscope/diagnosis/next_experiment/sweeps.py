@@ -5,23 +5,13 @@ import numpy as np
 from tauscope.recording.recording import Array
 from tauscope.trajectory import MotionLimits, MotionSamples, SampledSegment
 
-RATE_HZ = 100.0
-"""Samples that define the motion; between them it is a quintic."""
-
+RATE_HZ = 100.0  # samples that define the motion; between them it is a quintic
+# Cycles of the first joint; each further one makes one more, so that they reverse at different instants.
 LEAST_CYCLES = 2
-"""Cycles of the first joint; each further one makes one more, so that they reverse at different instants."""
-
-ACCELERATION_SHARE = 0.8
-"""Part of the acceleration limit that a reversal uses."""
-
-ROOM_SHARE = 0.9
-"""Part of the position range that a sweep crosses at most."""
-
-STEEPEST = 1.875
-"""Largest slope of the quintic step of height and length one."""
-
-LONGEST_TURN = 0.1
-"""Part of a cycle that one quarter of its turning may take."""
+ACCELERATION_SHARE = 0.8  # part of the acceleration limit that a reversal uses
+ROOM_SHARE = 0.9  # part of the position range that a sweep crosses at most
+STEEPEST = 1.875  # largest slope of the quintic step of height and length one
+LONGEST_TURN = 0.1  # part of a cycle that one quarter of its turning may take
 
 
 def sweep(limits: MotionLimits, share: float, duration_s: float) -> SampledSegment:

@@ -18,8 +18,7 @@ from tauscope.identification.autocorrelation import Autoregression
 from tauscope.recording.conditioning.common_band import Decimator
 from tauscope.recording.recording import Array
 
-FEWEST_ROWS = 150
-"""Rows of pure error that a joint's noise model needs."""
+FEWEST_ROWS = 150  # rows of pure error that a joint's noise model needs
 
 
 def with_pure_error(observations: Observations, model: ExtendedModel) -> Observations | None:
@@ -60,10 +59,7 @@ def repeated_differences(
 
 
 def white_noise(observations: Observations, model: ExtendedModel, share: float = 1.0) -> list[JointNoise]:
-    """White noise as large as all that a model leaves.
-
-    `share`: independent rows among all.
-    """
+    """White noise as large as all that a model leaves. `share`: independent rows among all."""
     found = []
     for pieces in residual_rows(model, observations):
         power = float(np.mean(np.concatenate([rows[0] for rows in pieces]) ** 2)) + np.finfo(float).tiny

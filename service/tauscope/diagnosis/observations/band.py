@@ -16,39 +16,23 @@ from tauscope.identification.band import quiet_limit
 from tauscope.recording.conditioning import Conditioner
 from tauscope.recording.recording import Array
 
-WIDENING = 4.0
-"""Width over the identification's band where its model explains too little."""
-
-LITTLE = 0.5
-"""Share of the torque's variance that a model explains at least for its band to mean anything."""
-
-NOISE_MARGIN = 0.8
-"""Share of the band at which the positions' noise would show in the accelerations."""
-
-WIDEST_HZ = 40.0
-"""Beyond, arms do not move, and rows cost time."""
-
-OPEN_SHARE = 0.3
-"""Share of the sampling rate that is never exceeded."""
-
+WIDENING = 4.0  # width over the identification's band where its model explains too little
+LITTLE = 0.5  # share of the torque's variance that a model explains at least for its band to mean anything
+NOISE_MARGIN = 0.8  # share of the band at which the positions' noise would show in the accelerations
+WIDEST_HZ = 40.0  # beyond, arms do not move, and rows cost time
+OPEN_SHARE = 0.3  # share of the sampling rate that is never exceeded
+# Noise of the velocity, relative to the width 1/K_v of friction's step, up to which a joint's own band is opened.
+# Narrower it rounds off how the joint sticks at its reversals, always to the same side, which looks like a delay or
+# like bristles; wider its noise blurs the step to either side. The rows' weights know of both, but what tells
+# asymmetric friction from a constant is lost in either: it is seen with a third more standard errors at 0.5 than at 1.
 BLURRED = 0.5
-"""Noise of the velocity, relative to the width 1/K_v of friction's step, up to which a joint's own band is opened.
-Narrower it rounds off how the joint sticks at its reversals, always to the same side, which looks like a delay or like
-bristles; wider its noise blurs the step to either side. The rows' weights know of both, but what tells asymmetric
-friction from a constant is lost in either: it is seen with a third more standard errors at 0.5 than at 1."""
-
-AT_MOST_BLURRED = 1.0
-"""…and up to which it is opened where it would otherwise show corners of friction's steps, below."""
-
+AT_MOST_BLURRED = 1.0  # …and up to which it is opened where it would otherwise show corners of friction's steps, below
+# …and up to which it is opened for what the torque is at single samples, where no band takes that noise out again.
 QUIET = 0.4
-"""…and up to which it is opened for what the torque is at single samples, where no band takes that noise out again."""
-
-STATE_BANDS = (2.0, 8.0)
-"""Narrowest and widest band of the motion relative to the common one."""
-
+STATE_BANDS = (2.0, 8.0)  # narrowest and widest band of the motion relative to the common one
+# Width of the motion's own band, over that of the comparison, that shows no corners of friction's steps. Where noise
+# alone sets the comparison, a joint's own band is opened that far.
 STEPS_SEEN = 2.5
-"""Width of the motion's own band, over that of the comparison, that shows no corners of friction's steps. Where noise
-alone sets the comparison, a joint's own band is opened that far."""
 
 
 def diagnosis_cutoff(conditioners: Sequence[Conditioner], identification: Identification, steepness: Array) -> float:
@@ -110,9 +94,8 @@ def _within(bands: Array, cutoff_hz: float) -> Array:
 def step_bands(conditioner: Conditioner, steepness: Array, blurred: float) -> Array:
     """Bands in which noise of density D makes K_v √(D (2π)² f³/3) of `blurred`, (n,) [Hz].
 
-    There is no limit, and the band infinite, where a joint does not move or its positions have no noise.
-
-    `steepness`: (n,), K_v of every joint's friction [s/rad or s/m].
+    There is no limit, and the band infinite, where a joint does not move or its positions have no noise. `steepness`:
+    (n,), K_v of every joint's friction [s/rad or s/m].
     """
     density = conditioner.noise.density
     widths = 3.0 * (blurred / np.maximum(steepness, 1e-9)) ** 2 / (4.0 * np.pi**2)

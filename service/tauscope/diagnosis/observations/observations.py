@@ -26,45 +26,32 @@ from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
 BoolArray = NDArray[np.bool_]
-
-LEFT_OUT = 100.0
-"""Factor to the noise of a joint that is left out."""
+LEFT_OUT = 100.0  # factor to the noise of a joint that is left out
 
 
 @dataclass(frozen=True)
 class Repetition:
-    """Where the motion of a recording repeats.
+    """Where the motion of a recording repeats."""
 
-    `start_s`: since the beginning of the recording [s].
-    `length_s`: of one period [s].
-    """
-
-    start_s: float
-    length_s: float
+    start_s: float  # since the beginning of the recording [s]
+    length_s: float  # of one period [s]
     count: int
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """One piece of motion with the torque of every repetition in the common band.
-
-    `torque`: (n, P, M), measured torque in the common band.
-    `used`: (n, P, M), rows that rest on measured torque.
-    `time`: (P, N), instants at the recorded rate, from the beginning of the recording [s].
-    `state_hz`: (n,), band of each joint's own motion [Hz].
-    `quiet_hz`: (n,), bands in which the velocities say most of single samples [Hz]; None for no filter.
-    `rigid_hz`: band in which the accelerations do [Hz]; None for no filter.
-    `temperature`: (n, P, N), at these instants [°C]; NaN at joints without a sensor, None where there is none.
-    """
+    """One piece of motion with the torque of every repetition in the common band."""
 
     prepared: PreparedMotion
-    torque: Array
-    used: BoolArray
-    time: Array
-    state_hz: Array
+    torque: Array  # (n, P, M), measured torque in the common band
+    used: BoolArray  # (n, P, M), rows that rest on measured torque
+    time: Array  # (P, N), instants at the recorded rate, from the beginning of the recording [s]
+    state_hz: Array  # (n,), band of each joint's own motion [Hz]
     position_noise: PositionNoise
+    # (n,), bands in which the velocities say most of single samples [Hz]; None for no filter
     quiet_hz: Array | None = None
-    rigid_hz: float | None = None
+    rigid_hz: float | None = None  # band in which the accelerations do [Hz]; None for no filter
+    # (n, P, N), at these instants [°C]; NaN at joints without a sensor, None where there is none
     temperature: Array | None = None
     memory: dict[str, Any] = field(default_factory=dict, repr=False)
 
@@ -92,19 +79,15 @@ class Piece:
         return self.repeated(rows) if rows.ndim == 2 else rows.reshape(len(rows), -1)
 
     def repeated(self, rows: Array) -> Array:
-        """Rows (k, M) that are the same in every repetition, (k, P M).
-
-        `rows`: (k, M), in the common band.
-        """
+        """Rows (k, M) that are the same in every repetition, (k, P M). `rows`: (k, M), in the common band."""
         return rows if self.repetitions == 1 else np.tile(rows, (1, self.repetitions))
 
     def without_noise_of_inertia(self, values: Array) -> Array:
         """Accelerations, or torque of the links (n, N), without what lies far above the common band.
 
         Friction's step needs the motion's whole band; inertia does not, and multiplies that band's noise by the square
-        of its frequency, which a column that is not linear in it would fold back.
-
-        `values`: (n, N), at the recorded rate.
+        of its frequency, which a column that is not linear in it would fold back. `values`: (n, N), at the recorded
+        rate.
         """
         if self.rigid_hz is None:
             return np.ascontiguousarray(values)
@@ -201,16 +184,12 @@ class Observations:
         return replace(self, pieces=tuple(pieces))
 
     def torque(self, joint: int) -> list[Array]:
-        """Measured torque of one joint in the common band, piece by piece, (1, P M) each.
-
-        `joint`: joint index, from 0.
-        """
+        """Measured torque of one joint in the common band, piece by piece, (1, P M) each."""
         return [piece.torque[joint].reshape(1, -1) for piece in self.pieces]
 
     def white(self, joint: int, rows: Sequence[Array]) -> Array:
         """Rows of all pieces, whitened, those that were not measured left out, (k, R).
 
-        `joint`: joint index, from 0.
         `rows`: sequence of (k, P M), a piece each.
         """
         whitened = np.concatenate([self.noise[joint].whitened(each) for each in rows], axis=-1)
@@ -221,17 +200,13 @@ class Observations:
     def independent_rows(self, joint: int, rows: Array) -> float:
         """Number of independent rows of a joint; one that tells less than a whole one counts as a part.
 
-        `joint`: joint index, from 0.
         `rows`: (R,), its white rows.
         """
         told = float(np.sum(self.weightings[joint].weights ** 2)) if self.weightings else float(len(rows))
         return self.noise[joint].share * told
 
     def kept(self, joint: int) -> BoolArray:
-        """Mask of the whitened rows that count, (rows,).
-
-        `joint`: joint index, from 0.
-        """
+        """Mask of the whitened rows that count, (rows,)."""
         if joint not in self._kept:
             self._kept[joint] = np.concatenate(
                 [self.noise[joint].kept(piece.used[joint].ravel()) for piece in self.pieces]
@@ -239,10 +214,7 @@ class Observations:
         return self._kept[joint]
 
     def row_labels(self, joint: int) -> tuple[NDArray[np.intp], Array]:
-        """Recording and instant of every whitened row that counts, (R,) each.
-
-        `joint`: joint index, from 0.
-        """
+        """Recording and instant of every whitened row that counts, (R,) each."""
         order = self.noise[joint].order
         recording = [np.full(piece.repetitions * piece.rows - order, piece.prepared.recording) for piece in self.pieces]
         instants = [piece.row_times()[order:] for piece in self.pieces]

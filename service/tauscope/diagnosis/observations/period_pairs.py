@@ -8,15 +8,11 @@ import numpy as np
 from tauscope.diagnosis.observations.observations import Observations, Piece
 from tauscope.recording.recording import Array
 
+# Part of the noise of a joint's velocity that must differ between periods: where the motion repeats to the sample, an
+# encoder rounds alike in each, and what that makes of the model's columns does not show between them.
 REPEATED_NOISE = 0.4
-"""Part of the noise of a joint's velocity that must differ between periods: where the motion repeats to the sample, an
-encoder rounds alike in each, and what that makes of the model's columns does not show between them."""
-
-STANDING = 10.0
-"""Largest velocity of a joint that stands, in standard deviations of its noise."""
-
-FEWEST_SAMPLES = 64
-"""Samples of a difference between periods below which it tells nothing."""
+STANDING = 10.0  # largest velocity of a joint that stands, in standard deviations of its noise
+FEWEST_SAMPLES = 64  # samples of a difference between periods below which it tells nothing
 
 
 @dataclass(frozen=True)
@@ -29,10 +25,7 @@ class PeriodPair:
     part: float
 
     def later(self, values: Array) -> Array:
-        """Signals a period later, (k, L).
-
-        `values`: (k, N), signals of the piece at all its samples.
-        """
+        """Signals a period later, (k, L). `values`: (k, N), signals of the piece at all its samples."""
         return (1.0 - self.part) * values[:, self.near] + self.part * values[:, self.far]
 
     @property

@@ -17,31 +17,22 @@ from tauscope.recording.recording import Array
 
 @dataclass(frozen=True, eq=False)
 class RowWeighting:
-    """What the rows of one joint are multiplied by.
+    """What the rows of one joint are multiplied by."""
 
-    `weights`: (R,), W: 1 where the columns are certain.
-    `directions`: (k, R), orthonormal, those of the shared errors among weighted rows.
-    `shrinkage`: (k,), share that is taken off along each: 0 where nothing is shared, 1 where nothing is left.
-    """
-
-    weights: Array
-    directions: Array
-    shrinkage: Array
+    weights: Array  # (R,), W: 1 where the columns are certain
+    directions: Array  # (k, R), orthonormal, those of the shared errors among weighted rows
+    shrinkage: Array  # (k,), share that is taken off along each: 0 where nothing is shared, 1 where nothing is left
 
     @staticmethod
     def of(weights: Array, shared: Array) -> "RowWeighting":
         """From the errors themselves.
 
-        `weights`: (R,), W.
-        `shared`: (k, R), S: each error at one standard deviation, among weighted rows.
+        `weights`: (R,), W; `shared`: (k, R), S: each error at one standard deviation, among weighted rows.
         """
         _, sizes, directions = np.linalg.svd(shared, full_matrices=False)
         return RowWeighting(weights, directions, 1.0 - 1.0 / np.sqrt(1.0 + sizes**2))
 
     def applied(self, rows: Array) -> Array:
-        """Whitened rows as they count, (k, R).
-
-        `rows`: (k, R), whitened rows.
-        """
+        """Whitened rows as they count, (k, R). `rows`: (k, R), whitened rows."""
         weighted = rows * self.weights
         return weighted - ((weighted @ self.directions.T) * self.shrinkage) @ self.directions

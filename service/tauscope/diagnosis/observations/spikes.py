@@ -10,17 +10,10 @@ from scipy import ndimage
 
 from tauscope.recording.recording import Array
 
-NEIGHBOURS = 7
-"""Samples of which the median is what a sample should be near to."""
-
-SURROUNDINGS = 31
-"""Samples that say how far it may be off where torque changes quickly."""
-
-FARTHEST = 5.0
-"""Standard deviations, by the median of their magnitudes, up to which a sample counts in full."""
-
-OF_MEDIAN = 1.4826
-"""Standard deviation of a Gaussian over the median of its magnitude."""
+NEIGHBOURS = 7  # samples of which the median is what a sample should be near to
+SURROUNDINGS = 31  # samples that say how far it may be off where torque changes quickly
+FARTHEST = 5.0  # standard deviations, by the median of their magnitudes, up to which a sample counts in full
+OF_MEDIAN = 1.4826  # standard deviation of a Gaussian over the median of its magnitude
 
 
 def without_spikes(torque: Array) -> Array:

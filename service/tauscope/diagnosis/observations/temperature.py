@@ -6,19 +6,15 @@ from scipy import ndimage
 from tauscope.recording.conditioning import Conditioner
 from tauscope.recording.recording import Array
 
-SMOOTHED_S = 10.0
-"""Width of the mean that takes out a sensor's steps [s]: a motor's housing warms up over minutes."""
-
-GRID_HZ = 10.0
-"""Rate at which temperatures are kept [Hz]."""
+SMOOTHED_S = 10.0  # width of the mean that takes out a sensor's steps [s]: a motor's housing warms up over minutes
+GRID_HZ = 10.0  # rate at which temperatures are kept [Hz]
 
 
 def read_temperature(conditioner: Conditioner, time: Array) -> Array | None:
     """Temperature of every joint.
 
-    `time`: (P, N), instants on the recording's clock [s].
-
-    Returns (n, P, N), [°C]; NaN at joints without a sensor, None where there is none.
+    Returns (n, P, N), [°C]; NaN at joints without a sensor, None where there is none. `time`: (P, N), instants on the
+    recording's clock [s].
     """
     if not conditioner.recording.has("temp"):
         return None

@@ -10,17 +10,12 @@ from scipy import signal
 from tauscope.identification.autocorrelation import AutocovarianceSum, Autoregression, LaggedProducts
 from tauscope.recording.recording import Array
 
-WELL_INSIDE = 0.85
-"""Part of the band in which its own filter leaves the noise as it is."""
-
+WELL_INSIDE = 0.85  # part of the band in which its own filter leaves the noise as it is
 FEWEST_FOR_SPECTRUM = 32
-
-SMALLEST_SHARE = 0.3
-"""Rows are never taken for more dependent than this."""
-
+SMALLEST_SHARE = 0.3  # rows are never taken for more dependent than this
+# Share of the noise's power that counts as white, so that whitening does not amplify by more than this what the band's
+# own filter has cut.
 FLOOR = 0.01
-"""Share of the noise's power that counts as white, so that whitening does not amplify by more than this what the
-band's own filter has cut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,10 +44,7 @@ class JointNoise:
         return replace(self, model=model)
 
     def whitened(self, rows: Array) -> Array:
-        """Rows (..., T) made white with unit variance, (..., T - p).
-
-        `rows`: (..., T), consecutive rows, time last.
-        """
+        """Rows (..., T) made white with unit variance, (..., T - p). `rows`: (..., T), consecutive rows, time last."""
         if not self.order:
             return rows / self.std
         filtered = signal.lfilter(np.append(1.0, -self.model.coefficients), [1.0], rows, axis=-1)
@@ -72,10 +64,9 @@ class JointNoise:
 def fitted_noise(pieces: Iterable[tuple[Array, NDArray[np.bool_], float]], band_share: float = 1.0) -> JointNoise:
     """Noise model of smallest BIC of pieces that are noise alone.
 
-    Within the band the whitened noise has unit density: its mean power is `JointNoise.share`.
-
-    `pieces`: iterable of ((T,) , (T,) , float), consecutive rows, which of them count, and the factor that turns their
-    power into the noise's.
+    Within the band the whitened noise has unit density: its mean power is `JointNoise.share`. `pieces`: iterable of
+    ((T,) , (T,) , float), consecutive rows, which of them count, and the factor that turns their power into the
+    noise's.
     """
     pieces = list(pieces)
     total = AutocovarianceSum()

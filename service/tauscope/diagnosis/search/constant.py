@@ -8,8 +8,7 @@ from tauscope.diagnosis.search.from_recordings import Searched
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
 from tauscope.diagnosis.search.proposals import Proposal, Proposer
 
-CERTAIN = 1e12
-"""Factor by which a constant that is not there is believed more precisely."""
+CERTAIN = 1e12  # factor by which a constant that is not there is believed more precisely
 
 
 def weigh_constant(searched: Searched, joint: int) -> tuple[float, tuple[Rival, ...]]:

@@ -12,8 +12,7 @@ from tauscope.diagnosis.search.scoring import unnamed_log_odds
 from tauscope.effects import Effect, TimeLocalEffect
 from tauscope.effects.computation import side_by_side
 
-WEIGHED = 4
-"""Rivals of a finding that are looked at, itself in another shape among them."""
+WEIGHED = 4  # rivals of a finding that are looked at, itself in another shape among them
 
 
 class Exchange:

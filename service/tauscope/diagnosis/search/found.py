@@ -15,19 +15,15 @@ from tauscope.recording.recording import Array
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """An effect that was added or refused.
-
-    `log_odds`, `trained_log_odds`: posterior, that it is there, after all motion and after training.
-    `covariance`: (p, p), of the parameters with it.
-    """
+    """An effect that was added or refused."""
 
     effect: Effect
-    log_odds: float
+    log_odds: float  # posterior, that it is there
     is_confirmed: bool
     before: ExtendedModel
     after: ExtendedModel
-    covariance: Array
-    trained_log_odds: float
+    covariance: Array  # (p, p), of the parameters with it
+    trained_log_odds: float  # the same after training alone
 
     @property
     def place(self) -> Place:
@@ -43,16 +39,12 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """What may be in the place of a finding.
-
-    `log_odds`: posterior, against neither.
-    `absent`: parameter of the nominal model in whose place it is.
-    """
+    """What may be in the place of a finding."""
 
     term: Term
     model: ExtendedModel
-    log_odds: float
-    absent: int | None = None
+    log_odds: float  # posterior, against neither
+    absent: int | None = None  # parameter of the nominal model in whose place it is
 
     @property
     def place(self) -> Place:
@@ -62,18 +54,12 @@ class Rival:
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
-    """Effects of one kind at one place beside all others.
+    """Effects of one kind at one place beside all others."""
 
-    `places`: of their terms in the model.
-    `without`: all others, at their most probable parameters.
-    `log_odds`: posterior, that it is there.
-    `rivals`: the most probable first.
-    """
-
-    places: tuple[int, ...]
-    without: Hypothesis
-    log_odds: float
-    rivals: tuple[Rival, ...]
+    places: tuple[int, ...]  # of their terms in the model
+    without: Hypothesis  # all others, at their most probable parameters
+    log_odds: float  # posterior, that it is there
+    rivals: tuple[Rival, ...]  # the most probable first
     proposals: tuple[Proposal, ...]
 
     @property
@@ -99,13 +85,9 @@ class Weighed:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Result of a search.
-
-    `steps`: every effect that was tried, in the order of trial.
-    `weighed`: every effect of the hypothesis.
-    """
+    """Result of a search."""
 
     nominal: Hypothesis
     hypothesis: Hypothesis
-    steps: tuple[Step, ...]
-    weighed: tuple[Weighed, ...]
+    steps: tuple[Step, ...]  # every effect that was tried, in the order of trial
+    weighed: tuple[Weighed, ...]  # every effect of the hypothesis

@@ -26,29 +26,22 @@ from tauscope.identification import Identification
 from tauscope.recording.conditioning import Conditioner
 from tauscope.recording.recording import Recording
 
-KNOWN_SPREAD = 2.0
-"""Standard deviation believed of a coefficient that is known beforehand, relative to its value."""
+KNOWN_SPREAD = 2.0  # standard deviation believed of a coefficient that is known beforehand, relative to its value
 
 
 @dataclass(frozen=True, eq=False)
 class Searched:
-    """A search and what it rests on.
-
-    `unseen`: held-out rows in the same band.
-    `deflections`: of joints with an encoder on the link.
-    `cutoff_hz`: of the band [Hz].
-    `pure_error`: whether repetitions tell the noise.
-    """
+    """A search and what it rests on."""
 
     found: Found
     laboratory: Laboratory
     effects: tuple[Effect, ...]
     setting: ArmContext
     rows: Observations
-    unseen: Observations | None
-    deflections: tuple[MeasuredDeflection, ...]
-    cutoff_hz: float
-    pure_error: bool
+    unseen: Observations | None  # held-out rows in the same band
+    deflections: tuple[MeasuredDeflection, ...]  # of joints with an encoder on the link
+    cutoff_hz: float  # of the band [Hz]
+    pure_error: bool  # whether repetitions tell the noise
 
 
 def search(

@@ -14,28 +14,21 @@ from tauscope.diagnosis.search.proposals import Proposal, Proposer
 from tauscope.diagnosis.search.window import window_log_odds
 from tauscope.effects import Effect, TimeLocalEffect
 
-NAMED = 3.0
-"""Log odds from which an effect is named, and from which training asks for it: nineteen in twenty."""
-
+NAMED = 3.0  # log odds from which an effect is named, and from which training asks for it: nineteen in twenty
+# Log odds of held-out motion alone, of the joints that an effect touches, from which it is shown: three to one.
 SHOWN = float(np.log(3.0))
-"""Log odds of held-out motion alone, of the joints that an effect touches, from which it is shown: three to one."""
-
+# …of held-out motion where training does not ask for it, and of a window in time, which no other motion can refute:
+# three standard errors.
 UNASKED = 18.0
-"""…of held-out motion where training does not ask for it, and of a window in time, which no other motion can refute:
-three standard errors."""
-
+# Log odds before the data that torque which is left out has a name: one in twenty laws is in no catalogue.
 CATALOGUED = 3.0
-"""Log odds before the data that torque which is left out has a name: one in twenty laws is in no catalogue."""
 
 
 @dataclass(frozen=True, eq=False)
 class Gates:
-    """Hypotheses on the same rows, judged by training and by held-out motion.
+    """Hypotheses on the same rows, judged by training and by held-out motion."""
 
-    `nominal`: model without what is looked for.
-    """
-
-    nominal: Hypothesis
+    nominal: Hypothesis  # model without what is looked for
     laboratory: Laboratory
     proposer: Proposer
     held_out: HeldOut | None

@@ -25,8 +25,7 @@ from tauscope.diagnosis.search.hypothesis import Hypothesis
 from tauscope.effects.computation import LastFew
 from tauscope.recording.recording import Array
 
-KEPT = 16
-"""Hypotheses whose errors are kept: each is compared with several others."""
+KEPT = 16  # hypotheses whose errors are kept: each is compared with several others
 
 
 @dataclass(frozen=True, eq=False)

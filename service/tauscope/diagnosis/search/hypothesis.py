@@ -17,67 +17,33 @@ from tauscope.diagnosis.model.term import Term
 from tauscope.identification import Identification
 from tauscope.recording.recording import Array
 
-SLOPE_SPREAD = 1.0
-"""Standard deviation of the logarithm of a friction slope that the robot file does not state."""
-
-HELD_SPREAD = 1e-6
-"""…that is held."""
-
-SHAPE_SPREAD = 1.0
-"""…of a shape that is searched by its logarithm."""
-
-RANGE_SPREAD = 1.0 / np.sqrt(12.0)
-"""…of another shape, relative to its range: that of a uniform distribution."""
-
-LARGEST_LOG_STEP = 0.5
-"""Change of a logarithm in one step: columns are straight over no more."""
-
-LARGEST_SHAPE_STEP = 0.15
-"""Change of another shape in one step, relative to its range."""
-
-HALVINGS = (1.0, 0.5, 0.25, 0.1)
-"""Parts of a step that are tried until the data are more probable."""
-
-WEIGHINGS = 5
-"""Rounds of dependence and scales, at most…"""
-
-ALIKE = 0.5
-"""…which end where the logarithm of κ changes by less."""
-
-NEAR = 1
-"""Steps to parameters by which proposals are ranked."""
-
-BODY_STEPS = 20
-"""Steps of the bodies within one of those, at most: a volume a million times too small doubles as often."""
-
-STEPS = 8
-"""Most steps to the most probable parameters."""
-
-ROUNDING = 1e-3
-"""Part of its standard error by which rounding may leave a coefficient beyond a bound."""
-
-PROGRESS = 0.1
-"""Gain in log probability below which a step is the last."""
+SLOPE_SPREAD = 1.0  # standard deviation of the logarithm of a friction slope that the robot file does not state
+HELD_SPREAD = 1e-6  # …that is held
+SHAPE_SPREAD = 1.0  # …of a shape that is searched by its logarithm
+RANGE_SPREAD = 1.0 / np.sqrt(12.0)  # …of another shape, relative to its range: that of a uniform distribution
+LARGEST_LOG_STEP = 0.5  # change of a logarithm in one step: columns are straight over no more
+LARGEST_SHAPE_STEP = 0.15  # change of another shape in one step, relative to its range
+HALVINGS = (1.0, 0.5, 0.25, 0.1)  # parts of a step that are tried until the data are more probable
+WEIGHINGS = 5  # rounds of dependence and scales, at most…
+ALIKE = 0.5  # …which end where the logarithm of κ changes by less
+NEAR = 1  # steps to parameters by which proposals are ranked
+BODY_STEPS = 20  # steps of the bodies within one of those, at most: a volume a million times too small doubles as often
+STEPS = 8  # most steps to the most probable parameters
+ROUNDING = 1e-3  # part of its standard error by which rounding may leave a coefficient beyond a bound
+PROGRESS = 0.1  # gain in log probability below which a step is the last
 
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """A model and what the data say of it.
-
-    `sizes`: tuple of (c,), standard deviation believed of every term's coefficients.
-    `linear`: about the model, coefficients that would pass a bound held there.
-    `free`: what is believed, with none held.
-    `scales`: one entry a joint.
-    `dependence`: κ of every joint.
-    """
+    """A model and what the data say of it."""
 
     model: ExtendedModel
-    sizes: tuple[Array, ...]
-    linear: LinearModel
-    free: LinearModel
+    sizes: tuple[Array, ...]  # tuple of (c,), standard deviation believed of every term's coefficients
+    linear: LinearModel  # about the model, coefficients that would pass a bound held there
+    free: LinearModel  # what is believed, with none held
     bodies: NormalBodies
-    scales: tuple[Scales, ...]
-    dependence: tuple[float, ...]
+    scales: tuple[Scales, ...]  # one entry a joint
+    dependence: tuple[float, ...]  # κ of every joint
 
     @cached_property
     def posterior(self) -> Posterior:
@@ -101,16 +67,12 @@ class Hypothesis:
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What is believed of a nominal model's parameters.
-
-    `friction`: (f, f), precision of the friction coefficients about zero.
-    `slopes`, `slope_spreads`: (s,), logarithms of friction's slopes, and their standard deviations.
-    """
+    """What is believed of a nominal model's parameters."""
 
     bodies: BodyPrior
-    friction: Array
-    slopes: Array
-    slope_spreads: Array
+    friction: Array  # (f, f), precision of the friction coefficients about zero
+    slopes: Array  # (s,), logarithms of friction's slopes
+    slope_spreads: Array  # (s,), their standard deviations
 
     @staticmethod
     def of(identification: Identification, model: ExtendedModel) -> "Prior":
@@ -127,14 +89,11 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Laboratory:
-    """Makes hypotheses about the same rows.
-
-    `repeated`: whether repetitions of the motion tell the noise.
-    """
+    """Makes hypotheses about the same rows."""
 
     rows: EvidenceRows
     prior: Prior
-    repeated: bool = False
+    repeated: bool = False  # whether repetitions of the motion tell the noise
 
     def start(self, model: ExtendedModel) -> Hypothesis:
         """The nominal model with bodies that have volume, under scales of highest evidence."""
@@ -281,17 +240,11 @@ class Laboratory:
         return step, links - at.model.links
 
     def with_term(self, at: Hypothesis, term: Term, size: Array) -> Hypothesis:
-        """A model with one effect more, as it is.
-
-        `size`: (c,), standard deviation believed of its coefficients.
-        """
+        """A model with one effect more, as it is. `size`: (c,), standard deviation believed of its coefficients."""
         return self.at(with_terms(at.model, [*at.model.terms, term]), [*at.sizes, size], at.scales, at.dependence)
 
     def without_term(self, at: Hypothesis, place: int) -> Hypothesis:
-        """A model with one effect less, as it is.
-
-        `place`: of the effect among the model's terms.
-        """
+        """A model with one effect less, as it is. `place`: of the effect among the model's terms."""
         terms = [term for at_place, term in enumerate(at.model.terms) if at_place != place]
         sizes = [size for at_place, size in enumerate(at.sizes) if at_place != place]
         return self.at(with_terms(at.model, terms), sizes, at.scales, at.dependence)

@@ -5,15 +5,13 @@ import numpy as np
 from tauscope.effects import Effect
 from tauscope.recording.recording import Array
 
-POINTS = 7
-"""Values at once: two zooms of them are a hundredth of the grid's step."""
+POINTS = 7  # values at once: two zooms of them are a hundredth of the grid's step
 
 
 def neighbours(effect: Effect, shape: Array, place: int) -> tuple[float, float]:
     """The grid's values of a shape parameter below and above, or its bounds.
 
-    `shape`: (k,), values of all shape parameters.
-    `place`: of the one among them.
+    `shape`: (k,), values of all shape parameters; `place`: of the one among them.
     """
     values = np.unique(effect.grid[:, place])
     at = int(np.argmin(np.abs(values - shape[place])))

@@ -24,11 +24,8 @@ from tauscope.effects.deflection import torque_of_deflection
 from tauscope.recording.conditioning.filters import smooth_each
 from tauscope.recording.recording import Array
 
-DRAWS = 4
-"""Of the noise: the expectation is a sum over thousands of rows, and needs few."""
-
-MOST = 1.0 / 3.0
-"""Share of what a column has in common with the residual that noise may account for."""
+DRAWS = 4  # of the noise: the expectation is a sum over thousands of rows, and needs few
+MOST = 1.0 / 3.0  # share of what a column has in common with the residual that noise may account for
 
 
 def is_position_noise(

@@ -16,45 +16,27 @@ from tauscope.effects.computation import side_by_side
 from tauscope.effects.deflection import Deflection
 from tauscope.recording.recording import Array
 
+# Effects that are looked at closer of those that explain most, and of those that explain most if nothing else can.
 LOOKED_AT = 5
-"""Effects that are looked at closer of those that explain most, and of those that explain most if nothing else can."""
-
-WORTH_A_LOOK = 2.0
-"""Log Bayes factor on the grid below which nothing comes of a closer look."""
-
-RIVALS = 0.5
-"""…relative to that of the effect in whose place it may be."""
-
-MOST_SHAPES = 600
-"""Shapes of a grid of thousands that are looked at first."""
-
-KINDS = (0, 3)
-"""Shape parameters of a window that are no numbers: its recordings, and its profile."""
-
-EDGES = (1, 2)
-"""…and those that have many optima."""
-
-ZOOMS = 2
-"""How often the neighbourhood of a shape parameter's best value is looked at."""
+WORTH_A_LOOK = 2.0  # log Bayes factor on the grid below which nothing comes of a closer look
+RIVALS = 0.5  # …relative to that of the effect in whose place it may be
+MOST_SHAPES = 600  # shapes of a grid of thousands that are looked at first
+KINDS = (0, 3)  # shape parameters of a window that are no numbers: its recordings, and its profile
+EDGES = (1, 2)  # …and those that have many optima
+ZOOMS = 2  # how often the neighbourhood of a shape parameter's best value is looked at
 
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """An effect at its most probable shape.
-
-    `log_factor`: log Bayes factor of the effect beside the hypothesis, its shape and size averaged over what is
-    believed.
-    `size`: (c,), standard deviation believed of its coefficients.
-    `unnamed`: log Bayes factor of torque without a name in its place.
-    `before`, `found`: the hypothesis, and with it, its coefficients at zero.
-    """
+    """An effect at its most probable shape."""
 
     term: Term
-    size: Array
+    size: Array  # (c,), standard deviation believed of its coefficients
+    # log Bayes factor of the effect beside the hypothesis, its shape and size averaged over what is believed
     log_factor: float
-    unnamed: float
-    before: Hypothesis
-    found: Hypothesis
+    unnamed: float  # log Bayes factor of torque without a name in its place
+    before: Hypothesis  # the hypothesis
+    found: Hypothesis  # the same with the effect, its coefficients at zero
 
     @property
     def place(self) -> Place:
@@ -64,13 +46,11 @@ class Proposal:
 
 @dataclass(frozen=True, eq=False)
 class Looks:
-    """Effects as they were seen beside hypotheses that differ at joints which they do not touch.
+    """Effects as they were seen beside hypotheses that differ at joints which they do not touch."""
 
-    `scored`: by an effect's identity, on its grid with the discrepancy and without.
-    `looked`: those that were looked at closer; None where no such effect can be.
-    """
-
+    # by an effect's identity, on its grid with the discrepancy and without
     scored: dict[int, tuple[Scored, Scored]] = field(default_factory=dict)
+    # those that were looked at closer; None where no such effect can be
     looked: dict[int, Proposal | None] = field(default_factory=dict)
 
     def forget(self, joints: Collection[int], count: int) -> None:
@@ -223,8 +203,7 @@ class Proposer:
     ) -> tuple[Array, Array]:
         """One shape parameter after the other: a free one between neighbours on the grid, a window's kind in turn.
 
-        `shape`: (k,), where it begins.
-        `size`: (c,), standard deviation believed of the coefficients there.
+        `shape`: (k,), where it begins; `size`: (c,), standard deviation believed of the coefficients there.
         """
         scorer = Scorer(self.rows, at)
 

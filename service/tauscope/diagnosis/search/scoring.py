@@ -20,26 +20,20 @@ from tauscope.diagnosis.search.hypothesis import Hypothesis
 from tauscope.effects import Effect, TimeLocalEffect
 from tauscope.recording.recording import Array
 
+# Rms of an effect's torque that is believed possible, as share of the joint's measured torque.
 SIZES = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
-"""Rms of an effect's torque that is believed possible, as share of the joint's measured torque."""
-
-INVISIBLE = 1e-7
-"""Share of a column outside the model's below which no data of this kind can show it."""
+INVISIBLE = 1e-7  # share of a column outside the model's below which no data of this kind can show it
 
 
 @dataclass(frozen=True, eq=False)
 class Scored:
-    """Shapes of an effect.
-
-    `log_factors`: (s,), log Bayes factor against the hypothesis without it; -inf where no such effect can be.
-    `coefficients`, `sizes`: (s, c), most probable values, and the standard deviation under which they are.
-    """
+    """Shapes of an effect."""
 
     effect: Effect
     shapes: Array
-    log_factors: Array
-    coefficients: Array
-    sizes: Array
+    log_factors: Array  # (s,), log Bayes factor against the hypothesis without it; -inf where no such effect can be
+    coefficients: Array  # (s, c), most probable values
+    sizes: Array  # (s, c), standard deviations under which they are
 
     @property
     def best(self) -> int:

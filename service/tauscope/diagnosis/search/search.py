@@ -16,19 +16,15 @@ from tauscope.diagnosis.search.proposals import Looks, Proposal, Proposer, Wante
 from tauscope.effects import Effect
 from tauscope.effects.computation import side_by_side
 
-MOST_EFFECTS = 12
-"""Effects that are added at most."""
+MOST_EFFECTS = 12  # effects that are added at most
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """A search among effects on the same rows.
-
-    `farther`: forms that say more than what they refine.
-    """
+    """A search among effects on the same rows."""
 
     gates: Gates
-    farther: Sequence[Effect] = ()
+    farther: Sequence[Effect] = ()  # forms that say more than what they refine
 
     def run(self, before: Found | None = None) -> Found:
         """Add what makes the data most probable and held-out motion no worse, to what was found before."""

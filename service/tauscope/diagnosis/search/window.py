@@ -6,23 +6,12 @@ from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
 from tauscope.recording.recording import Array
 
-OPEN = 1e-3
-"""Part of its largest row from which a row of an effect counts as inside its window."""
-
-CHANCE = 2.0
-"""Standard deviations by which the excess of white rows may be larger by chance."""
-
-STRETCHES = 12
-"""Parts of a window, at most, by which the standard error of its gain is known…"""
-
-SHORTEST = 4
-"""…and rows of each, at least: fewer agree because the effect was fitted to them."""
-
-FEWEST = 4
-"""Parts below which nothing is known."""
-
-MOST = 0.5
-"""Part of what exceeds the rows outside that an effect explains inside its window, at least."""
+OPEN = 1e-3  # part of its largest row from which a row of an effect counts as inside its window
+CHANCE = 2.0  # standard deviations by which the excess of white rows may be larger by chance
+STRETCHES = 12  # parts of a window, at most, by which the standard error of its gain is known…
+SHORTEST = 4  # …and rows of each, at least: fewer agree because the effect was fitted to them
+FEWEST = 4  # parts below which nothing is known
+MOST = 0.5  # part of what exceeds the rows outside that an effect explains inside its window, at least
 
 
 def window_log_odds(before: Hypothesis, after: Hypothesis, term: Term, laboratory: Laboratory) -> float:
