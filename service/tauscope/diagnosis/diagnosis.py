@@ -30,13 +30,7 @@ def diagnose(
     options: Options = DEFAULT,
     progress: Progress = lambda step: None,
 ) -> Diagnosis:
-    """Say what the best rigid-body and friction model of an arm leaves out.
-
-    Raises
-    ------
-    TauscopeError
-        where the recordings cannot even answer what the parameters are
-    """
+    """What the best nominal model of an arm leaves out. Raises TauscopeError where recordings tell no parameters."""
     identification = identify(robot, recordings, held_out, options, progress)
     wrong = identification.reversed_joints
     if wrong:

@@ -128,13 +128,7 @@ def model_document(diagnosis: Diagnosis) -> ModelDocument:
 
 
 def restore_model(document: ModelDocument, robot: Robot) -> ExtendedModel:
-    """The extended model of a document.
-
-    Raises
-    ------
-    IdentificationError
-        where it belongs to another arm, or names an effect that is not there
-    """
+    """The extended model of a document. Raises IdentificationError for another arm or an effect that is not there."""
     names = [joint.name for joint in robot.joints]
     base = base_parameters(robot)
     known = {entry.name: entry.value for entry in document.base_parameters}

@@ -15,10 +15,7 @@ from tauscope.robot.robot import STANDARD_PARAMETERS
 
 
 def tilt_directions(gravity: Array) -> tuple[Array, Array]:
-    """Two unit vectors across gravity, the frame's own axes where gravity lies along one.
-
-    `gravity`: (3,), in the base frame [m/s²].
-    """
+    """Two unit vectors across gravity, (3,) in the base frame, the frame's axes where it lies along one."""
     axes = np.eye(3)
     main = int(np.argmax(np.abs(gravity)))
     unit = gravity / np.linalg.norm(gravity)

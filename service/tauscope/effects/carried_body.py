@@ -37,10 +37,7 @@ def body_columns(signals: Signals) -> Array:
 
 
 def body_quantities(mass: float, place: Array, covariance: Array) -> Sequence[Quantity]:
-    """Mass and first moment with their standard errors; components of the place that no torque shows are left out.
-
-    `mass`: m [kg]; `place`: (3,), r [m]; `covariance`: (4, 4), of m and r.
-    """
+    """Mass and first moment of `place`, (3,), by `covariance`, (4, 4); none that no torque shows."""
     found = [Quantity("m", mass, float(np.sqrt(max(covariance[0, 0], 0.0))), "kg")]
     for axis, name in enumerate(("ms_x", "ms_y", "ms_z")):
         if covariance[1 + axis, 1 + axis] > 0.0:

@@ -103,10 +103,7 @@ class Signals:
         return self.of_motion[name]
 
     def derivative(self, values: Array) -> Array:
-        """Derivative in time of signals (..., N): by their Fourier series where periodic, else by differences.
-
-        `values`: (..., N), signals, time last.
-        """
+        """Derivative in time of `values`, (..., N): by their Fourier series where periodic, else by differences."""
         count = values.shape[-1]
         if not self.periodic:
             return _differences(values, self.rate_hz)
@@ -116,10 +113,7 @@ class Signals:
         return np.fft.irfft(rate * np.fft.rfft(values, axis=-1), n=count, axis=-1)
 
     def smoothed(self, values: Array, cutoff_hz: float) -> Array:
-        """Signals (N,) without what lies above a frequency, the phase kept.
-
-        `values`: (N,), a signal; `cutoff_hz`: highest frequency kept [Hz].
-        """
+        """`values`, (N,), without what lies above a frequency [Hz], the phase kept, (N,)."""
         if not self.periodic:
             return smooth(values[:, None], self.rate_hz, cutoff_hz)[:, 0]
         spectrum = np.fft.rfft(values)

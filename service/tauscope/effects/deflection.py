@@ -67,10 +67,7 @@ class Deflection(Effect):
         """
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """Torque of the deflection; where the motion repeats, as in a repetition that follows another.
-
-        `shapes`: (g, k), values of the shape parameters, `BAND` among them.
-        """
+        """Torque of the deflection, of `shapes`, (g, k), `BAND` among them; periodic where the motion repeats."""
         joint, band = self.joint or 0, self.shapes.index(BAND)
         times, count = 2 if signals.periodic else 1, signals.position.shape[-1]
         inertia = np.tile(inertia_of_link(signals, joint), times)
@@ -84,11 +81,7 @@ class Deflection(Effect):
 
 
 def torque_of_deflection(signals: Signals, joint: int, deflection: Array) -> Array:
-    """Torque that a small deflection of one joint's transmission makes at all joints.
-
-    `deflection`: (N,), δ, by how much the link lags the motor [rad or m].
-    Returns (n, N), τ(q - δ) - τ(q), to first order [Nm or N].
-    """
+    """τ(q - δ) - τ(q), (n, N), to first order [Nm or N], of a joint whose link lags by a `deflection` δ, (N,)."""
     by_position, by_velocity, by_acceleration = _slopes(signals, joint)
     rate = signals.derivative(deflection)
     torque = by_position * -deflection

@@ -141,10 +141,7 @@ class Effect(ABC):
         """
 
     def torque_of(self, signals: Signals, coefficients: Array, shape: Array) -> Array:
-        """Torque of the effect at its full size, (m, N) or (m, P, N): what its columns stand for to first order.
-
-        `coefficients`: (c,), values of the coefficients; `shape`: (k,), values of the shape parameters.
-        """
+        """Torque at full size, (m, N) or (m, P, N), of `coefficients`, (c,), and `shape`, (k,)."""
         (columns,) = self.columns(signals, shape[None])
         return np.asarray(np.tensordot(coefficients, columns, axes=1), dtype=np.float64)
 
@@ -158,39 +155,23 @@ class Effect(ABC):
         return ()
 
     def factor(self, coefficients: Array) -> float:
-        """By how much it multiplies what the parameters of the plain model make at its joint: 1 where it only adds.
-
-        `coefficients`: (c,), values of the coefficients.
-        """
+        """By how much `coefficients`, (c,), multiply what the plain model makes at its joint: 1 where it adds."""
         return 1.0
 
     def slope(self, torque: Array, coefficients: Array, shape: Array) -> Array:
-        """∂τ_recorded/∂τ at its joint, (N,), τ what the plain model makes there.
-
-        `torque`: (N,), τ [Nm or N]; `coefficients`: (c,); `shape`: (k,).
-        """
+        """∂τ_recorded/∂τ at its joint, (N,), of the plain `torque` τ, (N,), `coefficients`, (c,), and `shape`, (k,)."""
         return np.full(len(torque), self.factor(coefficients))
 
     def is_possible(self, shape: Array, k_v: float | None) -> bool:
-        """Whether this shape is still what the effect means, beside the joint's friction as it was fitted with it.
-
-        `shape`: (k,), values of the shape parameters; `k_v`: K_v of the effect's joint; None where there is none [s/rad
-        or s/m].
-        """
+        """Whether `shape`, (k,), is still what the effect means, beside K_v of its joint's friction, if any."""
         return True
 
     def limits(self, coefficients: Array, shape: Array) -> tuple[Array, Array]:
-        """Shapes between which both belong to one thing, (k,) each: a quantity that enters twice is estimated twice.
-
-        `coefficients`: (c,), values of the coefficients; `shape`: (k,), values of the shape parameters.
-        """
+        """Shapes, (k,) each, between which `coefficients`, (c,), and `shape`, (k,), belong to one thing."""
         return np.full(len(shape), -np.inf), np.full(len(shape), np.inf)
 
     def is_consistent(self, coefficients: Array, shape: Array) -> bool:
-        """Whether coefficients and shape belong to one thing, and are not merely held at its limits.
-
-        `coefficients`: (c,), values of the coefficients; `shape`: (k,), values of the shape parameters.
-        """
+        """Whether coefficients, (c,), and shape, (k,), belong to one thing, not merely held at its limits."""
         lower, upper = self.limits(coefficients, shape)
         return bool(np.all((lower < shape) & (shape < upper)))
 
@@ -231,10 +212,7 @@ class Effect(ABC):
     def quantities(
         self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
     ) -> tuple[Quantity, ...]:
-        """The parameters of a finding: coefficients, then shapes.
-
-        `coefficients`: (c,), estimates; `shape`: (k,), estimates; `covariance`: (c + k, c + k), of both.
-        """
+        """A finding's parameters: coefficients, (c,), then shape, (k,), with their `covariance`, (c + k, c + k)."""
         std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         names = (*self.coefficients, *self.shapes)
         values = (*coefficients, *shape)
@@ -246,10 +224,7 @@ class Effect(ABC):
 
 
 def per_joint_columns(rows: Array) -> Array:
-    """Columns (g, c, N) of a single joint in the form that `Effect.columns` returns, (g, c, 1, N).
-
-    `rows`: (g, c, N), columns.
-    """
+    """Columns of a single joint, `rows`, (g, c, N), in the form that `Effect.columns` returns, (g, c, 1, N)."""
     return rows[:, :, None, :]
 
 

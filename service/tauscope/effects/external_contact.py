@@ -97,10 +97,7 @@ def transposed_jacobian(signals: Signals) -> Array:
 
 
 def contact_windows(durations: Sequence[float]) -> tuple[Array, tuple[Array, Array]]:
-    """Windows of one recording each, and windows at the same instants of all, with the bounds of their shapes.
-
-    `durations`: of the recordings [s].
-    """
+    """Windows of one recording each, and at the same instants of all, with the bounds of their shapes."""
     scopes = [(float(place), length) for place, length in enumerate(durations)]
     if len(durations) > 1:
         scopes.append((EVERY, min(durations)))

@@ -72,10 +72,7 @@ def _torques(signals: Signals, displacements: Sequence[tuple[Array, float]]) -> 
 
 
 def displaced(robot: Robot, link: int, by: Array) -> Robot:
-    """The arm with the frame of one link, and all that follows, displaced.
-
-    `link`: index of the link, from 0; `by`: (3,), displacement in the moved joint's frame [m].
-    """
+    """The arm with the frame of one link, and all that follows, displaced `by` (3,), in the moved frame [m]."""
     segment = robot.segments[link]
     after = Placement(segment.after.rotation, segment.after.translation + by)
     segments = (*robot.segments[:link], replace(segment, after=after), *robot.segments[link + 1 :])

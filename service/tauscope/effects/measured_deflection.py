@@ -28,10 +28,7 @@ class MeasuredElasticity(JointElasticity):
 
     @classmethod
     def of(cls, context: ArmContext, joint: int, compliance: float, std: float) -> "MeasuredElasticity":
-        """The form of a joint.
-
-        `joint`: index, from 0; `compliance`, `std`: c and its standard error [rad/Nm or m/N].
-        """
+        """The form of a joint of compliance c and its standard error [rad/Nm or m/N]."""
         swings = (0.0, compliance) if context.inertia[joint] > 0.0 else (0.0,)
         grid = mesh(LOAD_BANDS * context.cutoff_hz, np.array(swings))
         return cls(joint, grid, grid.min(axis=0), grid.max(axis=0), compliance, std)
@@ -84,10 +81,7 @@ class MeasuredTeeth(SpringyTeeth):
 
     @classmethod
     def of(cls, context: ArmContext, joint: int, play: Array, compliance: Array) -> "MeasuredTeeth":
-        """The form of a joint.
-
-        `play`: (2,), b and its standard error [rad or m]; `compliance`: (2,), c and its standard error [rad/Nm or m/N].
-        """
+        """The form of a joint of play b [rad or m] and compliance c [rad/Nm or m/N], with standard errors, (2,)."""
         band = np.array([SPRINGY_BAND * context.cutoff_hz])
         grid = mesh(play[:1], band, compliance[:1], LOSSES)
         return cls(joint, grid, grid.min(axis=0), grid.max(axis=0), *play.tolist(), *compliance.tolist())

@@ -21,10 +21,7 @@ ENTRY_POINT_GROUP = "tauscope.effects"
 
 @cache
 def catalogue() -> tuple[type[Effect], ...]:
-    """The classes of all effects by rank, built-in ones first.
-
-    Raises IdentificationError where a plugin cannot be loaded, is no effect or has the id of another one.
-    """
+    """All effects' classes by rank, built-in ones first. Raises IdentificationError for a faulty plugin."""
     parts = [sorted(part, key=lambda each: (each.rank, each.id)) for part in (_built_in(), _plugins())]
     found: dict[str, type[Effect]] = {}
     for effect in (each for part in parts for each in part):

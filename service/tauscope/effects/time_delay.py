@@ -173,10 +173,7 @@ def shifted(torque: Array, delay: float, signals: Signals) -> Array:
 
 
 def low_passed(torque: Array, constant: float, order: int, signals: Signals) -> Array:
-    """Torque behind a filter, exact for torque that is linear from sample to sample, (m, N).
-
-    `torque`: (m, N), before it [Nm or N]; `constant`: each time constant T of the filter [s].
-    """
+    """Torque, (m, N) before and behind a filter, exact for torque that is linear from sample to sample."""
     samples = constant * signals.rate_hz
     kept = float(np.exp(-1.0 / samples))
     now, before = 1.0 - (1.0 - kept) * samples, (1.0 - kept) * samples - kept

@@ -16,10 +16,7 @@ OUTSIDE = -1.0
 
 
 def since(recording: int) -> float:
-    """Scope of a window that opens in one recording and stays open through all later ones.
-
-    `recording`: index of the recording, from 0.
-    """
+    """Scope of a window that opens in one recording and stays open through all later ones."""
     return -2.0 - recording
 
 
@@ -33,23 +30,14 @@ class TimeLocalEffect(Effect):
 
     @abstractmethod
     def torque(self, signals: Signals, shape: Array) -> Array:
-        """Torque per unit of each coefficient as if the window were always open, (c, m, N).
-
-        `shape`: (k,), values of the shape parameters; those of the window do not matter.
-        """
+        """Torque per unit of each coefficient, (c, m, N), of a shape, (k,), whose window is always open."""
 
     def outside(self, shape: Array) -> Array | None:
-        """Shape of the same effect wherever else in the training recordings, where that may be meant; else None.
-
-        `shape`: (k,), values of the shape parameters.
-        """
+        """The shape, (k,), outside the window of one, (k,), in the training recordings, where meant; else None."""
         return None
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
-        """The torque within the windows.
-
-        `shapes`: (g, k), scope, start [s], end [s], profile, then the effect's own.
-        """
+        """The torque within the windows: `shapes`, (g, k), scope, start [s], end [s], profile, the effect's own."""
         found = []
         for shape in shapes:
             window = open_share(shape, signals.recording, signals.time, 1.0 / signals.rate_hz)
@@ -57,10 +45,7 @@ class TimeLocalEffect(Effect):
         return np.stack(found)
 
     def when(self, coefficients: Array, shape: Array, names: Sequence[str], durations: Sequence[float]) -> str:
-        """When, in words.
-
-        `coefficients`: (c,), estimates; `shape`: (k,), values of the shape parameters; `durations`: of the same [s].
-        """
+        """When, in words, by coefficients, (c,), shape, (k,), and the recordings' durations [s]."""
         scope, start, end = shape[:3]
         if scope < EVERY:
             return f"from {start:.2f} s of {names[int(-2 - scope)]} on"

@@ -42,10 +42,7 @@ class Saturation(Effect):
 
     @abstractmethod
     def recorded(self, torque: Array, levels: Array) -> Array:
-        """Torque r(τ) as it is recorded with a = 1, (g, N).
-
-        `torque`: (N,), as it is [Nm or N]; `levels`: (g, 1), c [Nm or N].
-        """
+        """`torque`, (N,), as it is recorded, r(τ), with a = 1 and `levels` c, (g, 1) [Nm or N], (g, N)."""
 
     @abstractmethod
     def _derivative(self, torque: Array, level: float) -> Array:

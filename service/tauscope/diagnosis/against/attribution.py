@@ -176,10 +176,7 @@ class Attribution:
         return None
 
     def explain(self, first: LinkChange | None = None) -> tuple[Explanation, ...]:
-        """The most probable set of changes, the one that explains most first.
-
-        `first`: a change that is one of them in any case, and the first.
-        """
+        """The most probable set of changes, the largest first; `first` is one of them in any case, and the first."""
         start = _Set(self, ())
         start = start if first is None else start.with_change(first)
         kept = len(start.parts)
@@ -275,11 +272,7 @@ def _columns_of(base: BaseParameters, link: int, count: int) -> Array:
 
 
 def _most_probable(change: LinkChange, columns: Array, target: Array) -> Array:
-    """β of the largest probability.
-
-    `columns`: (r, 10), what each standard parameter of the link does to the whitened surplus.
-    `target`: (r,), that surplus.
-    """
+    """β of the largest probability, of `columns`, (r, 10), of the link's parameters to a whitened surplus, (r,)."""
     if change.is_linear:
         return _ridge(columns @ change.slope(np.zeros(len(change.spread))), change.spread, target)
     start = np.zeros(len(change.spread))

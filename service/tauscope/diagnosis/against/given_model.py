@@ -68,13 +68,7 @@ class Given:
 
 
 def against_model(diagnosis: Diagnosis) -> Diagnosis:
-    """The diagnosis compared with the robot file's model.
-
-    Raises
-    ------
-    IdentificationError
-        where the robot file has no model
-    """
+    """The diagnosis compared with the robot file's model. Raises IdentificationError where it has none."""
     robot = diagnosis.robot
     if robot.model.links is None and robot.model.friction is None:
         raise IdentificationError(

@@ -66,11 +66,7 @@ class LinkChange:
 
 
 def link_changes(link: int, stated: Array | None, spread: Array) -> Iterator[LinkChange]:
-    """All ways in which one link can be wrong.
-
-    `stated`: (10,), stated standard parameters; None where only changes are known.
-    `spread`: (10, 10), covariance believed of the link's standard parameters.
-    """
+    """All ways in which one link of `stated`, (10,), believed within `spread`, (10, 10), can be wrong."""
     mass = None if stated is None else float(stated[MASS])
     return (replace(each, stated_mass=mass) for each in _changes(link, stated, spread))
 

@@ -79,10 +79,7 @@ def link_recording(recording: Recording, encoders: LinkEncoders) -> Recording:
 def link_rows(
     recording: Recording, number: int, model: ExtendedModel, cutoff_hz: float | None
 ) -> Iterator[tuple[int, LinkRows]]:
-    """Joints that have an encoder on the link, with the rows of one recording, piece by piece.
-
-    `number`: index of the recording, from 0; `cutoff_hz`: of the common band [Hz]; None for no filter.
-    """
+    """Joints that have an encoder on the link, with the rows of one recording in the band, piece by piece."""
     robot, structure = model.structure.robot, model.structure
     if not recording.has("qlink"):
         return

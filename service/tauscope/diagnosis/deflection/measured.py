@@ -93,11 +93,7 @@ class MeasuredDeflection:
 def measure_deflection(
     recordings: Sequence[Recording], identification: Identification, model: ExtendedModel, cutoff_hz: float | None
 ) -> tuple[MeasuredDeflection, ...]:
-    """Compliance and play of every joint that has an encoder on its link, by joint.
-
-    `model`: nominal one of the identification, which tells the load.
-    `cutoff_hz`: of the band of the comparison [Hz]; None for no filter.
-    """
+    """Compliance and play of every joint that has an encoder on its link; the nominal model tells the load."""
     rows: dict[int, list[LinkRows]] = {}
     for number, recording in enumerate(recordings):
         for joint, found in link_rows(recording, number, model, cutoff_hz):

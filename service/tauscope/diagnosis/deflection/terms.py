@@ -26,10 +26,7 @@ class DirectTerm:
 
 
 def direct_terms(measured: Sequence[MeasuredDeflection], setting: ArmContext) -> list[DirectTerm]:
-    """Terms of all deflections that are certain.
-
-    Teeth give way too: compliance is a finding of its own where it moves the link by more than play does.
-    """
+    """Terms of all that is certain; compliance beside play where it moves the link by more than that."""
     found = []
     for each in measured:
         compliance, play = np.array([each.compliance, each.compliance_std]), np.array([each.play, each.play_std])

@@ -57,10 +57,7 @@ def residual_spectra(diagnosis: Diagnosis) -> list[ResidualSpectrum]:
 
 
 def noise_density(noise: JointNoise, frequency: Array, rate_hz: float) -> Array:
-    """One-sided density of a joint's noise, 2 σ² / (f_s |1 - Σ a_k e^{-iωk}|²).
-
-    Returns (F,), [(Nm)²/Hz or N²/Hz]. `frequency`: (F,), [Hz]; `rate_hz`: rate of the rows, f_s [Hz].
-    """
+    """Noise 2 σ² / (f_s |1 - Σ a_k e^{-iωk}|²) at `frequency`, (F,) [Hz], one-sided, (F,) [(Nm)²/Hz or N²/Hz]."""
     polynomial = np.append(1.0, -noise.model.coefficients)
     _, response = signal.freqz(polynomial, worN=2.0 * np.pi * frequency / rate_hz)
     return 2.0 * noise.model.innovation_variance / (rate_hz * np.abs(response) ** 2)

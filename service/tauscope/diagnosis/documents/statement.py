@@ -40,10 +40,7 @@ class Statement:
 def state_finding(
     finding: Finding, quantities: Sequence[Quantity], diagnosis: Diagnosis, *, tentative: bool
 ) -> Statement:
-    """The statement of a finding; a tentative one advises nothing.
-
-    `quantities`: its parameters, those of its first term first.
-    """
+    """The statement of a finding by its parameters, its first term's first; a tentative one advises nothing."""
     names = [joint.name for joint in diagnosis.robot.joints]
     found = {each.name: each for each in quantities}
     effect = finding.terms[0].effect

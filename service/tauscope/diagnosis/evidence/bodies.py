@@ -90,10 +90,7 @@ class BodyPrior:
         return float(off @ self.precision @ off) - 2.0 * volumes
 
     def share(self, links: Array, step: Array) -> float:
-        """Part of a step that leaves every link its volume, at most 1.
-
-        `links`, `step`: (10 n,), standard parameters and their change.
-        """
+        """Part of a step of links, (10 n,) each, that leaves every one its volume, at most 1."""
         share = 1.0
         for own in _each(links):
             root = cholesky(pseudo_inertia(links[own] - THINNEST * self.mean[own]), lower=True)

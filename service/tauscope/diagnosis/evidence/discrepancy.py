@@ -83,10 +83,7 @@ def _find_principal(features: Array) -> Array:
 
 
 def beyond(columns: Array, features: Array) -> Array:
-    """Features without what columns can make, (b, R).
-
-    `columns`: (k, R), white columns of the nominal model; `features`: (b, R), white rows.
-    """
+    """`features`, (b, R), without what white `columns` of the nominal model, (k, R), can make, (b, R)."""
     length = np.linalg.norm(columns, axis=1, keepdims=True)
     unit = columns / np.where(length > 0.0, length, 1.0)
     squares, directions = np.linalg.eigh(unit @ unit.T)

@@ -66,11 +66,7 @@ class LinearModel:
         return len(self.mean)
 
     def extend(self, columns: Mapping[int, Array], mean: Array, std: Array) -> "LinearModel":
-        """The same with more parameters.
-
-        `columns`: mapping of int to (c, R_j), their white columns at every joint that they act on.
-        `mean`, `std`: (c,), of what is believed of them.
-        """
+        """The same with more white columns, (c, R_j) by joint, of parameters of believed mean and std, (c,)."""
         index = np.arange(self.size, self.size + len(mean))
         joints = tuple(
             own.extend(index, columns[joint]) if joint in columns else own for joint, own in enumerate(self.joints)
@@ -80,10 +76,7 @@ class LinearModel:
         return LinearModel(joints, np.concatenate([self.mean, mean]), precision)
 
     def hold(self, places: Index, values: Array) -> "LinearModel":
-        """The same with some parameters believed to have a value.
-
-        `places`: (c,), their places among all; `values`: (c,), those values.
-        """
+        """The same with parameters at `places`, (c,), believed to have `values`, (c,)."""
         precision, right = self.precision.copy(), self.precision @ self.mean
         certain = CERTAIN * np.diag(self.precision)[places]
         precision[places, places] += certain
@@ -91,10 +84,7 @@ class LinearModel:
         return replace(self, mean=np.linalg.solve(precision, right), precision=precision)
 
     def without(self, places: Index, values: Array) -> "LinearModel":
-        """The same with some parameters held at a value; their places stay, with no column.
-
-        `places`: (c,), their places among all; `values`: (c,), what they are held at.
-        """
+        """The same with parameters at `places`, (c,), held at `values`, (c,); they stay, with no column."""
         return replace(self, joints=tuple(own.without(places, values) for own in self.joints))
 
     def posterior(self, scales: Sequence[Scales]) -> Posterior:
@@ -195,10 +185,7 @@ class _Sum:
         return _Sum(matrix, right, energy, self.determinant + found.log_determinant)
 
     def marginal(self, index: Index) -> "_Sum":
-        """What is left for some parameters when all others are integrated out, less a constant.
-
-        `index`: (k,), places of those that stay.
-        """
+        """What is left for parameters of `index`, (k,), when all others are integrated out, less a constant."""
         others = np.setdiff1d(np.arange(len(self.right)), index)
         scale = np.sqrt(np.diag(self.matrix)[others])
         root = factor(self.matrix[np.ix_(others, others)], scale)

@@ -17,10 +17,7 @@ KEPT = 2  # scales whose products are kept: many hypotheses ask for the same
 
 
 def factor(matrix: Array, scale: Array) -> Array:
-    """Lower Cholesky factor of a matrix whose rows are divided by their scale, (p, p).
-
-    `matrix`: (p, p), positive definite but for rounding; `scale`: (p,), root of its diagonal.
-    """
+    """Lower Cholesky factor, (p, p), of a matrix, (p, p), over its `scale`, (p,), the root of its diagonal."""
     correlation = matrix / np.outer(scale, scale) + ROUNDING * np.eye(len(scale))
     return np.asarray(np.linalg.cholesky(correlation), dtype=np.float64)
 
@@ -73,10 +70,7 @@ class JointMoments:
         return np.stack([own @ rows.T for own, rows in parts]), np.stack([m @ m.transpose(0, 2, 1) for m in mutual])
 
     def extend(self, index: Index, columns: Array) -> "JointMoments":
-        """The same with columns of more parameters.
-
-        `index`: (c,), their places among all parameters; `columns`: (c, R), white rows.
-        """
+        """The same with white columns, (c, R), of more parameters, at `index`, (c,), among all."""
         crossed, mutual = self.against(columns[None])
         at, count = self.visible, len(columns)
         order = np.r_[:at, len(self.rows) : len(self.rows) + count, at : len(self.rows)]
@@ -100,10 +94,7 @@ class JointMoments:
         return replace(self, rows=root * self.rows, products=share * self.products, counts=share * self.counts)
 
     def without(self, places: Index, values: Array) -> "JointMoments":
-        """The same with some parameters held at a value.
-
-        `places`: (c,), their places among all parameters; `values`: (c,), what they are held at.
-        """
+        """The same with parameters at `places`, (c,), among all held at `values`, (c,)."""
         held = np.isin(self.index, places)
         value_of = dict(zip(places.tolist(), values.tolist(), strict=True))
         change = np.eye(len(self.rows))

@@ -84,10 +84,7 @@ class EvidenceRows:
         return replace(self, certain=tuple(own[order] for own, order in zip(weights, self.order, strict=True)))
 
     def take(self, joint: int, rows: Array, dependence: float) -> Array:
-        """The rows of a joint that count, as much as they tell, in order of their class, (…, R_j).
-
-        `rows`: (…, R), white rows; `dependence`: κ.
-        """
+        """Those of `rows`, (…, R), that count, as much as they tell under κ, in order of class, (…, R_j)."""
         return rows[..., self.order[joint]] * (self.certain[joint] / np.sqrt(dependence))
 
     def moments(
@@ -133,10 +130,7 @@ class EvidenceRows:
         return self.successions[joint].dependence(rows)
 
     def columns(self, effect: Effect, shapes: Array, signals: Sequence[Signals]) -> dict[int, Array]:
-        """White rows of an effect at every joint that it touches, in order of time, (s, c, R).
-
-        `shapes`: (s, k), values of its shape parameters.
-        """
+        """White rows of an effect of `shapes`, (s, k), at every joint that it touches, in order of time, (s, c, R)."""
         return white_columns(self.observations, effect, shapes, signals)
 
     @property
@@ -165,10 +159,7 @@ def find_rest(observations: Observations, model: ExtendedModel, joint: int) -> t
 
 
 def weigh_rows(observations: Observations, model: ExtendedModel, joint: int, noise: float = 1.0) -> Array:
-    """How much every white row of a joint tells beside friction's step and at stops, (R,).
-
-    `noise`: σ of the rows, relative to white noise.
-    """
+    """How much every white row tells beside friction's step and at stops, (R,); `noise`: σ over white noise."""
     _, stops = find_rest(observations, model, joint)
     certain = certainty(observations, model, joint, OPEN / noise**2)
     return certain * _weigh_stops(observations, model, joint, stops, noise)

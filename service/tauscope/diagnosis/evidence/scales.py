@@ -28,10 +28,7 @@ class Scales:
 
     @staticmethod
     def start(level: float, *, repeated: bool = False) -> "Scales":
-        """Noise as it was estimated, and a discrepancy of a tenth of what is left.
-
-        `repeated`: whether repetitions of the motion tell the noise.
-        """
+        """Noise as it was estimated, or as repetitions tell it, and a discrepancy of a tenth of what is left."""
         values = np.array([0.0, *[np.log(0.1 * level)] * GROUPS, REST])
         return Scales(values, level, REPEATED_SPREAD if repeated else NOISE_SPREAD)
 
@@ -50,18 +47,11 @@ class Scales:
         return self.noise**-2.0 / (1.0 + np.exp(2.0 * self.values[-1]) * REST_SHARES**2)
 
     def amplitudes(self, groups: NDArray[np.intp]) -> Array:
-        """Amplitude of each feature; 1 for an error of known size, group -1.
-
-        Returns (b,), amplitudes. `groups`: (b,), group of each feature.
-        """
+        """Amplitude of each feature, (b,), by `groups`, (b,); 1 for an error of known size, group -1."""
         return np.where(groups < 0, 1.0, np.exp(self.values[1:-1])[groups])
 
     def collect(self, by_class: Array, by_feature: Array, groups: NDArray[np.intp]) -> Array:
-        """Slopes in the logarithms, (2 + G,).
-
-        `by_class`: (K,), slope in the variance of each class; `by_feature`: (b,), slope in log a of each feature;
-        `groups`: (b,), group of each feature.
-        """
+        """Slopes in the logarithms, (2 + G,), of variances `by_class`, (K,), log a `by_feature` and `groups`, (b,)."""
         rest = np.exp(2.0 * self.values[-1]) * REST_SHARES**2
         variance = self.noise**2
         of_noise = float(by_class @ (2.0 * variance * (1.0 + rest)))

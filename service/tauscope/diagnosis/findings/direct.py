@@ -20,10 +20,7 @@ AGREED = 3.0  # standard errors by which held-out motion may show another size
 def with_direct_findings(
     diagnosis: Diagnosis, measured: Sequence[MeasuredDeflection], again: Sequence[MeasuredDeflection]
 ) -> Diagnosis:
-    """The diagnosis with every deflection that is certain, and what smaller ones would have been seen.
-
-    `again`: the same on held-out recordings.
-    """
+    """The diagnosis with every deflection that is certain, also by held-out motion `again`, and what would be seen."""
     findings = {finding.place: finding for finding in diagnosis.findings}
     unseen = {each.joint: each for each in again}
     for direct in direct_terms(measured, diagnosis.setting):

@@ -18,10 +18,7 @@ TAIL = 0.05  # share of the draws that lie beyond where the tails are compared
 
 
 def effective_number(found: Moments, columns: Mapping[int, Array], rng: np.random.Generator) -> float:
-    """Effective number of shapes, at least 1.
-
-    `columns`: mapping of int to (g, c, R_j), the same shapes' whitened columns at every joint.
-    """
+    """Effective number of shapes, at least 1, of whitened `columns`, (g, c, R_j) by joint."""
     shapes, count = found.target.shape
     inner = found.inner.reshape(shapes * count, -1)
     gram = -inner @ inner.T

@@ -94,10 +94,7 @@ def _energy(fit: Fit, joint: int) -> float:
 
 
 def _concentration(variable: str, values: Array, power: Array, least: float = CONCENTRATED) -> Place | None:
-    """The window of neighbouring bins that holds most of the excess.
-
-    `least`: share of the excess from which it is one.
-    """
+    """The window of neighbouring bins that holds most of the excess, from a `least` share of it."""
     total = float(power.sum())
     edges = np.quantile(values, np.linspace(0.0, 1.0, BINS + 1))
     if total <= 0.0 or edges[0] == edges[-1]:

@@ -38,10 +38,7 @@ def states_friction(robot: Robot) -> bool:
 
 
 def with_plain_terms(diagnosis: Diagnosis, lacking: Lacking) -> Diagnosis:
-    """The diagnosis with a finding for every nominal term that is there and that the given model lacks.
-
-    `lacking`: what the given model does not have.
-    """
+    """The diagnosis with a finding for every nominal term that is there and that the given model lacks."""
     named = {finding.place for finding in diagnosis.findings}
     constants = {each.terms[0].effect.joint for each in diagnosis.findings if each.terms[0].effect.has_constant}
     added = []

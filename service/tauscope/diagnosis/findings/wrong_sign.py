@@ -17,10 +17,7 @@ OPPOSITE = np.array([-2.0])  # gain g of 1 + g = -1
 
 
 def with_wrong_signs(diagnosis: Diagnosis, joints: Sequence[int]) -> Diagnosis:
-    """The diagnosis with a finding for each joint whose torque has the wrong sign, or one for all.
-
-    `joints`: joint indices, from 0; their torque already has the right sign in the diagnosis.
-    """
+    """The diagnosis with a finding for each joint of wrong sign, or one for all; it has them right already."""
     if not joints:
         return diagnosis
     whole = len(joints) == diagnosis.robot.joint_count > 1

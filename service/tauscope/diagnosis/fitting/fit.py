@@ -206,10 +206,7 @@ def _room(model: ExtendedModel, limits: Array) -> tuple[NDArray[np.intp], Array,
 
 
 def stepped(model: ExtendedModel, step: Array) -> ExtendedModel:
-    """The model moved by a step, each shape within its bounds and what its coefficients let it be.
-
-    `step`: (p,), change of every parameter, of slopes their logarithm's.
-    """
+    """The model moved by a step, (p,), each shape within its bounds and what its coefficients let it be."""
     size = model.structure.size
     terms = list(model.structure.terms)
     for place, (joint, name) in enumerate(model.constants):

@@ -83,10 +83,7 @@ def project(
 
 
 def fitted_parameters(columns: Sequence[JointColumns], target: Sequence[Array], size: int) -> Array:
-    """The fitted parameters alone, (p,): with no basis and no residual, a fraction of what `project` costs.
-
-    `target`: sequence of (R_j,), what is fitted, one a joint.
-    """
+    """The fitted parameters alone, (p,), of `target`, (R_j,) a joint: a fraction of the cost of `project`."""
     spread = _spread(columns, np.zeros((0, size)))
     inner = np.zeros(size)
     for own, y in zip(columns, target, strict=True):
@@ -111,10 +108,7 @@ def _spread(columns: Sequence[JointColumns], known_rows: Array) -> Array:
 
 
 def moments(projection: Projection, columns: Mapping[int, Array]) -> Moments:
-    """Moments of a candidate's columns beside a fitted model.
-
-    `columns`: mapping of int to (g, c, R_j), whitened columns at every joint that the candidate touches.
-    """
+    """Moments of a candidate's whitened columns, (g, c, R_j) by joint, beside a fitted model."""
     target, inner, gram = 0.0, 0.0, 0.0
     for joint, rows in columns.items():
         target = target + rows @ projection.residual[joint]

@@ -57,20 +57,14 @@ def weightings_of_motion(observations: Observations, model: ExtendedModel) -> tu
 
 
 def certainty(observations: Observations, model: ExtendedModel, joint: int, share: float) -> Array:
-    """1 / √(1 + s u² / σ²) of every white row, (R,): how much it counts beside a step that is known to u.
-
-    `share`: s, part of u² that a row is held to be off by.
-    """
+    """1 / √(1 + s u² / σ²) of every white row, (R,), beside a step known to u of which it is off by a `share` s."""
     noise = observations.noise[joint]
     parts = [_uncertain_power(piece, model, joint)[noise.order :] / noise.model.variance for piece in observations]
     return 1.0 / np.sqrt(1.0 + share * np.concatenate(parts)[observations.kept(joint)])
 
 
 def shared_errors(observations: Observations, model: ExtendedModel, joint: int, weights: Array) -> Array:
-    """What the band may have made of all reversals alike, rounded and moved, among weighted rows, (2, R).
-
-    `weights`: (R,), of the white rows.
-    """
+    """What the band may have rounded and moved all reversals by, (2, R), among rows of `weights`, (R,)."""
     changes, slopes = [], []
     for piece in observations:
         motion = piece.prepared.motion

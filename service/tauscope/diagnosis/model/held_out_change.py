@@ -45,10 +45,7 @@ class HeldOutChange:
 
     @staticmethod
     def between(before: Array, after: Array, difference: Array | None = None) -> "HeldOutChange":
-        """From squared errors of two models, and what they differ in.
-
-        `before`, `after`, `difference`: (n, S), summed over the same stretches.
-        """
+        """From squared errors of two models and what they differ in, (n, S) each, summed over the same stretches."""
         count, whole = before.shape[1], before.sum(axis=1)
         ratio = _divide(after.sum(axis=1), whole)
         if count == 1:

@@ -98,10 +98,7 @@ def setting_of(
 
 
 def mean_inertia(robot: Robot, bodies: Array, position: Array) -> Array:
-    """Mean of the mass matrix's diagonal along a motion, not below zero, (n,) [kg m² or kg].
-
-    `bodies`: (10 n,), standard parameters; `position`: (N, n), of the motion [rad or m].
-    """
+    """Mean of the mass matrix's diagonal of `bodies`, (10 n,), along `position`, (N, n), (n,) [kg m² or kg]."""
     poses = position[:: max(len(position) // POSES, 1)]
     diagonal = np.diagonal(mass_matrix(robot, bodies, poses), axis1=1, axis2=2)
     return np.asarray(np.maximum(diagonal.mean(axis=0), 0.0))

@@ -29,10 +29,7 @@ class Term:
         return self.effect.id, self.effect.joint
 
     def is_possible(self, k_v: float | None) -> bool:
-        """Whether an effect can have these coefficients and this shape.
-
-        `k_v`: of the effect's joint; None where there is none [s/rad or s/m].
-        """
+        """Whether an effect can have these coefficients and this shape, beside its joint's `k_v` if it has one."""
         signs = zip(self.effect.coefficients, self.coefficients, strict=True)
         possible = all(
             each.smallest <= abs(value) <= each.largest and (value >= 0.0 or not each.positive) for each, value in signs

@@ -49,13 +49,7 @@ def is_wanted(diagnosis: Diagnosis) -> bool:
 
 
 def plan_experiment(diagnosis: Diagnosis, progress: Callable[[str], None] = lambda step: None) -> PlannedExperiment:
-    """Plan the recording to make next.
-
-    Raises
-    ------
-    ExcitationError
-        where the arm's limits allow no motion
-    """
+    """Plan the recording to make next. Raises ExcitationError where the arm's limits allow no motion."""
     progress("plan the next experiment")
     judge = _judge(diagnosis)
     bank = Bank(diagnosis.identification, np.random.default_rng(0))

@@ -33,10 +33,7 @@ class Played:
 
 
 def played(trajectory: Trajectory, observations: Observations, model: ExtendedModel, cutoff_hz: float) -> Played:
-    """Sample a motion as the recordings were, and condition it as they were.
-
-    `cutoff_hz`: band of the comparison [Hz].
-    """
+    """Sample a motion as the recordings were, and condition it as they were, in a band [Hz]."""
     robot, rate = observations.robot, observations.pieces[0].prepared.motion.rate_hz
     samples = trajectory.samples(rate)
     position = _measured(samples.position, [piece.position_noise for piece in observations], rate)
@@ -63,10 +60,7 @@ def _measured(position: Array, noises: Sequence[PositionNoise], rate_hz: float) 
 def equations(
     model: ExtendedModel, fitter: Fitter, others: Sequence[ExtendedModel] = (), absent: int | None = None
 ) -> Array:
-    """A model's whitened columns, and beside them the differences to other models' torque, as few rows, (r, p + o).
-
-    `absent`: a parameter that the model does not have; its column is zero.
-    """
+    """Whitened columns, zero for an `absent` one, and differences to other models' torque, as few rows, (r, p + o)."""
     own = fitter.white_residual(model)
     differences = [
         [mine - theirs for mine, theirs in zip(own, fitter.white_residual(other), strict=True)] for other in others
@@ -86,10 +80,7 @@ def equations(
 
 
 def separations(model: ExtendedModel, stacked: Array) -> Array:
-    """λ of each other model: what of the differences is left outside the model's columns, (o,).
-
-    `stacked`: (r, p + o), its `equations` of all recordings.
-    """
+    """λ of each other model, (o,): what columns leave of the differences in `stacked` equations, (r, p + o)."""
     prior, _ = model.prior()
     columns = np.concatenate([stacked[:, : model.size], prior])
     differences = np.concatenate([stacked[:, model.size :], np.zeros((len(prior), stacked.shape[1] - model.size))])
@@ -101,10 +92,7 @@ def separations(model: ExtendedModel, stacked: Array) -> Array:
 
 
 def log_variances(model: ExtendedModel, stacked: Array) -> Array:
-    """Logarithm of the variance of every parameter, (p,); large where nothing is known of it.
-
-    `stacked`: (r, p), its `equations` of all recordings.
-    """
+    """Log variance of every parameter, (p,), by `stacked` equations, (r, p); large where nothing is known of it."""
     prior, _ = model.prior()
     columns = np.concatenate([stacked, prior])
     scale = np.linalg.norm(columns, axis=0)

@@ -15,10 +15,7 @@ LONGEST_TURN = 0.1  # part of a cycle that one quarter of its turning may take
 
 
 def sweep(limits: MotionLimits, share: float, duration_s: float) -> SampledSegment:
-    """All joints at ± a part of their top speed, turning smoothly, from rest to rest where they began.
-
-    `duration_s`: how long [s].
-    """
+    """All joints at ± a part of their top speed, turning smoothly, from rest to rest where they began."""
     time = np.arange(round(duration_s * RATE_HZ) + 1) / RATE_HZ
     count = len(limits.velocity)
     position, velocity, acceleration = (np.empty((len(time), count)) for _ in range(3))

@@ -36,10 +36,7 @@ STEPS_SEEN = 2.5
 
 
 def diagnosis_cutoff(conditioners: Sequence[Conditioner], identification: Identification, steepness: Array) -> float:
-    """Cut-off of the band that torque and columns share [Hz].
-
-    `steepness`: (n,), K_v of every joint's friction [s/rad or s/m].
-    """
+    """Cut-off of the band that torque and columns share, by K_v of friction, `steepness`, (n,) [Hz]."""
     widest = _widest(conditioners)
     limit = quiet_limit(conditioners)
     quiet = widest if limit is None else min(widest, NOISE_MARGIN * limit)
@@ -63,11 +60,7 @@ def _without_corners(conditioners: Sequence[Conditioner], steepness: Array) -> f
 
 
 def state_cutoffs(conditioner: Conditioner, cutoff_hz: float | None, steepness: Array) -> Array | None:
-    """Cut-off of each joint's own smoothing, (n,) [Hz]; None for no filter.
-
-    `cutoff_hz`: of the common band [Hz]; None for no filter; `steepness`: (n,), K_v of every joint's friction [s/rad or
-    s/m].
-    """
+    """Cut-off of each joint's own smoothing, (n,) [Hz], by K_v, `steepness`, (n,); None for no filter."""
     if cutoff_hz is None:
         return None
     without_corners = np.minimum(STEPS_SEEN * cutoff_hz, step_bands(conditioner, steepness, AT_MOST_BLURRED))
@@ -75,11 +68,7 @@ def state_cutoffs(conditioner: Conditioner, cutoff_hz: float | None, steepness: 
 
 
 def quiet_cutoffs(conditioner: Conditioner, cutoff_hz: float | None, steepness: Array) -> Array | None:
-    """The same for what the torque is at single samples.
-
-    `cutoff_hz`: of the common band [Hz]; None for no filter; `steepness`: (n,), K_v of every joint's friction [s/rad or
-    s/m].
-    """
+    """The same, (n,) [Hz], for what the torque is at single samples, by K_v, `steepness`, (n,)."""
     if cutoff_hz is None:
         return None
     return _within(step_bands(conditioner, steepness, QUIET), cutoff_hz)

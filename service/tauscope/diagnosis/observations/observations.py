@@ -71,10 +71,7 @@ class Piece:
         return self.torque.shape[2]
 
     def reduced(self, values: Array) -> Array:
-        """Signals (k, N) or (k, P, N) in the common band, all repetitions one after another, (k, P M).
-
-        `values`: (k, N) or (k, P, N), at the recorded rate.
-        """
+        """`values`, (k, N) or (k, P, N), in the common band, all repetitions one after another, (k, P M)."""
         rows = self.prepared.motion.band.reduce(values)
         return self.repeated(rows) if rows.ndim == 2 else rows.reshape(len(rows), -1)
 
@@ -133,11 +130,7 @@ class Observations:
         cutoff_hz: float | None,
         steepness: Array,
     ) -> "Observations":
-        """Condition recordings in a band.
-
-        `cutoff_hz`: the common band [Hz]; None for no filter.
-        `steepness`: (n,), K_v of every joint's friction, for the band of the motion itself [s/rad or s/m].
-        """
+        """Condition recordings in a band [Hz], None for no filter, that of the motion itself by K_v, (n,)."""
         starts = [float(c.recording.samples(0, 1).time[0]) for c in conditioners]
         bands = [state_cutoffs(c, cutoff_hz, steepness) for c in conditioners]
         quiet = [quiet_cutoffs(c, cutoff_hz, steepness) for c in conditioners]
@@ -169,10 +162,7 @@ class Observations:
         return replace(self, weightings=tuple(weightings))
 
     def without_joints(self, joints: Collection[int]) -> "Observations":
-        """The same rows, those of some joints as good as left out: what no other joint tells stays what it is.
-
-        `joints`: indices, from 0.
-        """
+        """The same rows, those of some joints as good as left out: what no other joint tells stays what it is."""
         noise = [own.times(LEFT_OUT) if joint in joints else own for joint, own in enumerate(self.noise)]
         return replace(self, noise=tuple(noise))
 
@@ -188,20 +178,14 @@ class Observations:
         return [piece.torque[joint].reshape(1, -1) for piece in self.pieces]
 
     def white(self, joint: int, rows: Sequence[Array]) -> Array:
-        """Rows of all pieces, whitened, those that were not measured left out, (k, R).
-
-        `rows`: sequence of (k, P M), a piece each.
-        """
+        """Rows of all pieces, (k, P M) each, whitened, those that were not measured left out, (k, R)."""
         whitened = np.concatenate([self.noise[joint].whitened(each) for each in rows], axis=-1)
         kept = self.kept(joint)
         counted = whitened if kept.all() else whitened[..., kept]
         return self.weightings[joint].applied(counted) if self.weightings else counted
 
     def independent_rows(self, joint: int, rows: Array) -> float:
-        """Number of independent rows of a joint; one that tells less than a whole one counts as a part.
-
-        `rows`: (R,), its white rows.
-        """
+        """Number of independent white rows, (R,), of a joint; one that tells less than a whole one is a part."""
         told = float(np.sum(self.weightings[joint].weights ** 2)) if self.weightings else float(len(rows))
         return self.noise[joint].share * told
 

@@ -25,10 +25,7 @@ class RowWeighting:
 
     @staticmethod
     def of(weights: Array, shared: Array) -> "RowWeighting":
-        """From the errors themselves.
-
-        `weights`: (R,), W; `shared`: (k, R), S: each error at one standard deviation, among weighted rows.
-        """
+        """From `weights`, (R,), W, and `shared`, (k, R), S: each error at one std among weighted rows."""
         _, sizes, directions = np.linalg.svd(shared, full_matrices=False)
         return RowWeighting(weights, directions, 1.0 - 1.0 / np.sqrt(1.0 + sizes**2))
 

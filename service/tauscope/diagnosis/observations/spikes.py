@@ -17,10 +17,7 @@ OF_MEDIAN = 1.4826  # standard deviation of a Gaussian over the median of its ma
 
 
 def without_spikes(torque: Array) -> Array:
-    """Torque whose single samples stay within reach of their neighbours.
-
-    `torque`: (n, N), as recorded, a row a joint [Nm or N].
-    """
+    """The recorded `torque`, (n, N), a row a joint, whose single samples stay within reach of their neighbours."""
     if torque.shape[1] < SURROUNDINGS:
         return torque
     middle = ndimage.median_filter(torque, size=(1, NEIGHBOURS), mode="nearest")

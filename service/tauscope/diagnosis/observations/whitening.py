@@ -51,10 +51,7 @@ class JointNoise:
         return filtered[..., self.order :] / self.std
 
     def kept(self, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Whitened rows (T - p,) of which all that went in was measured.
-
-        `used`: (T,), which rows rest on measured torque.
-        """
+        """Whitened rows, (T - p,), of which all that went in was measured, `used`, (T,)."""
         if used.all():
             return used[self.order :]
         missed = np.convolve(~used, np.ones(self.order + 1))[: len(used)] > 0.5

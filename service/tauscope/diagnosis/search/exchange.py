@@ -66,10 +66,7 @@ class Exchange:
         return min(doubtful, key=lambda own: weighed[own].log_odds, default=None)
 
     def _try_rival(self, at: Hypothesis, weighed: Weighed) -> Hypothesis | None:
-        """The hypothesis with the best rival in the place of an effect, where that is more probable.
-
-        Training alone, too, has to predict their joints no worse with it.
-        """
+        """The hypothesis with the best rival in an effect's place, where more probable, also by training alone."""
         gates = self.gates
         if weighed.rivals[0].place in self.gone:
             return None

@@ -9,10 +9,7 @@ POINTS = 7  # values at once: two zooms of them are a hundredth of the grid's st
 
 
 def neighbours(effect: Effect, shape: Array, place: int) -> tuple[float, float]:
-    """The grid's values of a shape parameter below and above, or its bounds.
-
-    `shape`: (k,), values of all shape parameters; `place`: of the one among them.
-    """
+    """The grid's values below and above the one at a place of `shape`, (k,), or its bounds."""
     values = np.unique(effect.grid[:, place])
     at = int(np.argmin(np.abs(values - shape[place])))
     low = values[at - 1] if at > 0 else effect.lower[place]

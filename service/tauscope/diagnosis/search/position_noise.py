@@ -31,10 +31,7 @@ MOST = 1.0 / 3.0  # share of what a column has in common with the residual that 
 def is_position_noise(
     effect: Effect, shape: Array, model: ExtendedModel, observations: Observations, signals: Sequence[Signals]
 ) -> bool:
-    """Whether noise of the positions accounts for more than `MOST` of what an effect that swings explains.
-
-    `shape`: (k,), values of its shape parameters.
-    """
+    """Whether noise of the positions accounts for more than `MOST` of what an effect of `shape`, (k,), explains."""
     white = WhiteColumns(observations)
     beside = project(white.all(model), white.residual(model), model.size)
     plain = white_columns(observations, effect, shape[None], signals)

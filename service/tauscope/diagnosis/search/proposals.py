@@ -238,10 +238,7 @@ class Proposer:
     def columns(
         self, effect: Effect, shapes: Array, signals: Sequence[Signals], dependence: Sequence[float]
     ) -> dict[int, Array]:
-        """White rows of an effect at every joint that it touches, (s, c, R_j).
-
-        `shapes`: (s, k), values of its shape parameters.
-        """
+        """White rows of an effect of `shapes`, (s, k), at every joint that it touches, (s, c, R_j)."""
         white = self.rows.columns(effect, shapes, signals)
         return {joint: self.rows.take(joint, rows, dependence[joint]) for joint, rows in white.items()}
 
