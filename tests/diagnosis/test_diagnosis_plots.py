@@ -9,8 +9,7 @@ from scipy import signal
 from diagnosis.test_diagnosis_of_simulated_arms import diagnosed
 from tauscope.diagnosis.documents.plots import BINS, TIME, VARIABLES, DiagnosisPlots, diagnosis_plots
 from tauscope.diagnosis.documents.residual_spectrum import noise_density
-from tauscope.diagnosis.documents.rounded import DIGITS, rounded
-from tauscope.diagnosis.documents.torque_overlay import judging_observations
+from tauscope.diagnosis.documents.torque_overlay import DIGITS, judging_observations, rounded
 from tauscope.diagnosis.model.residual import predicted_rows
 from tauscope.diagnosis.observations.whitening import JointNoise
 from tauscope.identification.autocorrelation import Autoregression

@@ -8,7 +8,7 @@ import pytest
 from diagnosis.diagnosed_arm import only_effects, recordings
 from diagnosis.test_diagnosis_of_simulated_arms import spring
 from tauscope.diagnosis import Diagnosis, Verdict, diagnose, document
-from tauscope.diagnosis.documents.impossible import impossible_places
+from tauscope.diagnosis.documents.document import impossible_places
 from tauscope.identification import document as identification_document
 from tauscope.robot import Model, read_robot
 from tauscope_sim.examples import example_robot

@@ -9,10 +9,9 @@ import pytest
 from identification.simulated import Array, paper_robot, simulate
 from tauscope.diagnosis import Diagnosis, diagnose, document
 from tauscope.diagnosis.next_experiment import is_wanted, plan_experiment
-from tauscope.diagnosis.next_experiment.bank import KINDS, Bank
+from tauscope.diagnosis.next_experiment.bank import KINDS, Bank, sweep
 from tauscope.diagnosis.next_experiment.plan import SETTLING, PlannedExperiment
 from tauscope.diagnosis.next_experiment.separation import equations, log_variances, separations
-from tauscope.diagnosis.next_experiment.sweeps import sweep
 from tauscope.excitation import require_within_limits
 from tauscope.identification import Identification, identify
 from tauscope.recording import Recording, read_recording

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from tauscope.diagnosis.findings.effective_number import effective_number
+from tauscope.diagnosis.findings.detectability import effective_number
 from tauscope.diagnosis.fitting.projection import JointColumns, Moments, fitted_parameters, moments, project
 
 Array = NDArray[np.float64]

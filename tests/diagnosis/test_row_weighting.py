@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauscope.diagnosis.observations.row_weighting import RowWeighting
+from tauscope.diagnosis.observations.whitening import RowWeighting
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 3), st.floats(0.0, 30.0))

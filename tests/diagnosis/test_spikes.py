@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tauscope.diagnosis.observations.spikes import without_spikes
+from tauscope.diagnosis.observations.channels import without_spikes
 
 RATE = 200.0
 TIME = np.arange(8000) / RATE

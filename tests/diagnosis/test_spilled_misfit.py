@@ -11,9 +11,8 @@ from identification.simulated import Array, SimulatedArm, paper_robot
 from tauscope.diagnosis import diagnose, document
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.fitting.fit import Fitter
-from tauscope.diagnosis.fitting.lack_of_fit import lack_of_fit
+from tauscope.diagnosis.fitting.lack_of_fit import lack_of_fit, without_spilled
 from tauscope.diagnosis.fitting.regressor_noise import weightings_of_motion
-from tauscope.diagnosis.fitting.spilled_misfit import without_spilled
 from tauscope.diagnosis.noise.floor import with_pure_error
 
 pytestmark = pytest.mark.slow

@@ -12,7 +12,7 @@ from effects.piece_of_motion import SIGNALS, context
 from identification.simulated import paper_robot
 from tauscope.diagnosis import diagnose, document
 from tauscope.diagnosis.extended_model import model_document, restore_model
-from tauscope.diagnosis.observations.temperature import read_temperature
+from tauscope.diagnosis.observations.channels import read_temperature
 from tauscope.effects.friction_drift import FrictionDrift, ThermalDrift
 from tauscope.recording.conditioning import Conditioner
 

@@ -10,8 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from tauscope.diagnosis.documents.residual_spectrum import ResidualSpectrum, residual_spectra
-from tauscope.diagnosis.documents.rounded import rounded
-from tauscope.diagnosis.documents.torque_overlay import TorqueOverlay, torque_overlays
+from tauscope.diagnosis.documents.torque_overlay import TorqueOverlay, rounded, torque_overlays
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.model.residual import residual_rows
 from tauscope.diagnosis.observations.observations import Observations

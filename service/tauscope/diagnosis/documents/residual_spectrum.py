@@ -4,8 +4,7 @@ import numpy as np
 from pydantic import Field
 from scipy import signal
 
-from tauscope.diagnosis.documents.rounded import rounded
-from tauscope.diagnosis.documents.torque_overlay import judging_observations
+from tauscope.diagnosis.documents.torque_overlay import judging_observations, rounded
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.residual import residual_rows

@@ -3,7 +3,6 @@
 import numpy as np
 from pydantic import Field
 
-from tauscope.diagnosis.documents.rounded import rounded
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.model.residual import predicted_rows
 from tauscope.diagnosis.observations.observations import Observations
@@ -11,6 +10,7 @@ from tauscope.recording.recording import Array
 from tauscope.strict_model import ResultModel
 
 MOST_ROWS = 900  # rows of one overlay: about two a pixel
+DIGITS = 5
 
 
 class TorqueOverlay(ResultModel):
@@ -76,3 +76,11 @@ def _most_telling(observations: Observations, predicted: list[list[Array]], join
                 first = repetition * piece.rows + start
                 best, chosen = float(sums[start]), (place, slice(first, first + length))
     return chosen
+
+
+def rounded(values: Array) -> list[float]:
+    """Values to `DIGITS` significant digits: a figure's document is a third as long. `values`: (N,), what is drawn."""
+    magnitude = np.floor(np.log10(np.maximum(np.abs(values), np.finfo(float).tiny)))
+    # Powers of ten beyond what a float holds would turn the smallest numbers into NaN.
+    scale = 10.0 ** np.clip(DIGITS - 1 - magnitude, -300.0, 300.0)
+    return (np.round(values * scale) / scale).tolist()

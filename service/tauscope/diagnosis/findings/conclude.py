@@ -7,22 +7,20 @@ import numpy as np
 
 from tauscope.diagnosis.findings.constancy import constancy
 from tauscope.diagnosis.findings.detectability import Detectable, detectable, detectable_parameters, visibilities
-from tauscope.diagnosis.findings.diagnosed import Diagnosis, Selection
+from tauscope.diagnosis.findings.diagnosed import Diagnosis, Selection, Unseen
 from tauscope.diagnosis.findings.finding import Finding, FitSizes, equivalent, in_order
 from tauscope.diagnosis.findings.location import locate
 from tauscope.diagnosis.findings.plain import states_friction
-from tauscope.diagnosis.findings.unseen import Unseen
 from tauscope.diagnosis.fitting.fit import Fit, Fitter
-from tauscope.diagnosis.fitting.spilled_misfit import without_spilled
+from tauscope.diagnosis.fitting.lack_of_fit import without_spilled
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.nominal import delivered_model
 from tauscope.diagnosis.model.term import Place
 from tauscope.diagnosis.model.torque_scale import covariance_on_the_arm
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.search.found import Step
-from tauscope.diagnosis.search.from_recordings import Searched
+from tauscope.diagnosis.search.from_recordings import Searched, measure_lack, rows_under, weigh
 from tauscope.diagnosis.search.hypothesis import Hypothesis
-from tauscope.diagnosis.search.left import measure_lack, rows_under, weigh
 from tauscope.effects.payload import Payload
 from tauscope.effects.plain_terms import TorqueOffset
 from tauscope.identification import Identification

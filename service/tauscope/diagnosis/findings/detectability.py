@@ -1,21 +1,23 @@
 """What would have been seen, had it been there: the smallest size of every effect that these data show."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import optimize, stats
 
-from tauscope.diagnosis.findings.effective_number import effective_number
 from tauscope.diagnosis.fitting.fit import Fit
-from tauscope.diagnosis.fitting.projection import INVISIBLE, moments
+from tauscope.diagnosis.fitting.projection import INVISIBLE, Moments, moments
 from tauscope.diagnosis.fitting.white_columns import SHAPES_AT_ONCE, white_columns
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.effects import Effect, Signals
 from tauscope.effects.computation import side_by_side
 from tauscope.effects.plain_terms import PlainTerm
+from tauscope.recording.recording import Array
 
 POWER = 0.9  # chance at which an effect of the smallest size is found
+DRAWS = 5000  # draws: 250 of them lie beyond
+TAIL = 0.05  # share of the draws that lie beyond where the tails are compared
 
 
 @dataclass(frozen=True)
@@ -109,3 +111,32 @@ def _strength(count: int, shapes_tried: float, level: float) -> float:
             lambda strength: stats.ncx2.sf(threshold, count, strength) - POWER, 1e-6, 100.0 + 10.0 * threshold
         )
     )
+
+
+def effective_number(found: Moments, columns: Mapping[int, Array], rng: np.random.Generator) -> float:
+    """Effective number of shapes, at least 1, of whitened `columns`, (g, c, R_j) by joint.
+
+    Neighbouring shapes explain the same noise: of g shapes only n_eff count. With the projected columns' Gram matrix K,
+    b ~ N(0, K) is what noise does to all columns at once; the tail of max_g bᵀ G_g⁻¹ b over a single shape's χ² tail is
+    n_eff. No data are needed: it belongs to the design.
+    """
+    shapes, count = found.target.shape
+    inner = found.inner.reshape(shapes * count, -1)
+    gram = -inner @ inner.T
+    for own in columns.values():
+        rows = own.reshape(shapes * count, -1)
+        gram += rows @ rows.T
+    scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+    known = values > 1e-9 * values[-1]
+    draws = (vectors[:, known] * np.sqrt(values[known])) @ rng.standard_normal((int(known.sum()), DRAWS))
+    visible = np.flatnonzero((found.shares > INVISIBLE).all(axis=1))
+    sizes = scale.reshape(shapes, count)[visible]
+    own = found.gram[visible] / (sizes[:, :, None] * sizes[:, None, :])
+    largest = np.zeros(DRAWS)
+    for place, inverse in zip(visible, np.linalg.pinv(own, rcond=1e-9, hermitian=True), strict=True):
+        drawn = draws[place * count : (place + 1) * count]
+        largest = np.maximum(largest, np.einsum("cd,cd->d", drawn, inverse @ drawn))
+    threshold = float(np.quantile(largest, 1.0 - TAIL))
+    single = float(stats.chi2.sf(threshold, count))
+    return float(np.clip(-np.log1p(-TAIL) / max(single, 1e-12), 1.0, shapes))

@@ -9,12 +9,12 @@ from tauscope.diagnosis.findings.constancy import Constancy
 from tauscope.diagnosis.findings.detectability import Detectable
 from tauscope.diagnosis.findings.finding import Finding, FitSizes, in_order
 from tauscope.diagnosis.findings.location import JointMismatch
-from tauscope.diagnosis.findings.unseen import Unseen
 from tauscope.diagnosis.findings.verdict import Evidence, Verdict, verdict
 from tauscope.diagnosis.findings.wrong_value import WrongValue
 from tauscope.diagnosis.fitting.fit import Fit, Fitter
 from tauscope.diagnosis.fitting.lack_of_fit import LackOfFit
 from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.observations.observations import Observations
 from tauscope.effects import ArmContext
 from tauscope.identification import Identification
 from tauscope.identification.warnings import extrapolations, undetermined
@@ -23,6 +23,7 @@ from tauscope.robot import Robot
 
 # Energy that findings take off a joint's residual, in noise variances, from which there was something to explain.
 EXPLAINED = 20.0
+PREDICTED = 4.0  # power of a held-out residual, in noise variances, up to which a model predicts the motion
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,22 @@ class Selection:
 
     nominal: Fit
     fit: Fit
+
+
+@dataclass(frozen=True, eq=False)
+class Unseen:
+    """Held-out rows, with the noise of the training ones."""
+
+    observations: Observations
+
+    @cached_property
+    def fitter(self) -> Fitter:
+        """Fits to these rows."""
+        return Fitter(self.observations)
+
+    def is_predicted_by(self, model: ExtendedModel) -> bool:
+        """Whether a model leaves no joint much more than noise; otherwise the training motion was too poor."""
+        return all(float(row @ row) <= PREDICTED * len(row) for row in self.fitter.white_residual(model))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy import stats
 
-from tauscope.diagnosis.deflection.measured import CERTAIN, MeasuredDeflection
-from tauscope.diagnosis.deflection.terms import DirectTerm, direct_terms
+from tauscope.diagnosis.deflection.measured import CERTAIN, DirectTerm, MeasuredDeflection, direct_terms
 from tauscope.diagnosis.findings.detectability import Detectable
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.findings.finding import Finding

@@ -6,7 +6,7 @@ there, a constant that the recordings show is a finding whatever they are compar
 says nothing, nor does a URDF: its <dynamics> are often placeholders.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,13 +17,16 @@ from tauscope.diagnosis.findings.finding import Finding, equivalent
 from tauscope.diagnosis.fitting.fit import Fit
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.term import Term
-from tauscope.diagnosis.search.constant import weigh_constant
+from tauscope.diagnosis.search.found import Rival
 from tauscope.diagnosis.search.from_recordings import Searched
+from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
+from tauscope.diagnosis.search.proposals import Proposal, Proposer
 from tauscope.effects.plain_terms import CoulombFriction, PlainTerm, StribeckTerm, TorqueOffset, ViscousFriction
 from tauscope.robot import Robot
 
 PLAIN: tuple[type[PlainTerm], ...] = (CoulombFriction, StribeckTerm, ViscousFriction, TorqueOffset)
 Lacking = Collection[tuple[int, str]]  # joint indices and names of the nominal terms that the given model does not have
+CERTAIN = 1e12  # factor by which a constant that is not there is believed more precisely
 
 
 def undeclared_offsets(diagnosis: Diagnosis) -> Lacking:
@@ -111,3 +114,41 @@ def _is_seen_again(place: int, value: float, diagnosis: Diagnosis) -> bool | Non
     again = diagnosis.held_out.fitter.projected(diagnosis.selection.fit.model)
     found = diagnosis.selection.fit.model.parameters[place] + again.projection.step[place]
     return bool(np.sign(found) == np.sign(value))
+
+
+def weigh_constant(searched: Searched, joint: int) -> tuple[float, tuple[Rival, ...]]:
+    """Log odds of a joint's constant, and its rivals, against a model with neither.
+
+    Friction that is larger one way, or a spring far from its rest, may be taken for it.
+    """
+    final, laboratory = searched.found.hypothesis, searched.laboratory
+    place = final.model.structure.coefficient(joint, "offset")
+    if place is None:
+        return 0.0, ()
+    laboratory = _hold(laboratory, place - len(laboratory.prior.bodies.base))
+    parameters = final.model.parameters.copy()
+    parameters[place] = 0.0
+    without = laboratory.at(replace(final.model, parameters=parameters), final.sizes, final.scales, final.dependence)
+    without = laboratory.settle(without, [joint])
+    beside = laboratory.tune(laboratory.under(without, final.dependence, [joint]), [joint])
+    effects = [each for each in searched.effects if each.joint == joint]
+    proposals = Proposer(laboratory, effects).propose(without, lambda effect: not effect.is_expected)
+    return final.log_evidence - beside.log_evidence, _rivals(laboratory, without, proposals, place)
+
+
+def _hold(laboratory: Laboratory, place: int) -> Laboratory:
+    """The same where a friction coefficient is believed to be zero."""
+    friction = laboratory.prior.friction.copy()
+    friction[place, place] *= CERTAIN
+    return replace(laboratory, prior=replace(laboratory.prior, friction=friction))
+
+
+def _rivals(
+    laboratory: Laboratory, without: Hypothesis, proposals: Sequence[Proposal], absent: int
+) -> tuple[Rival, ...]:
+    found = []
+    for proposal in proposals:
+        painted = laboratory.paint(without, proposal.found)
+        model = laboratory.approach(laboratory.with_term(painted, proposal.term, proposal.size)).model
+        found.append(Rival(model.terms[-1], model, proposal.log_factor, absent))
+    return tuple(sorted(found, key=lambda each: -each.log_odds))

@@ -6,12 +6,12 @@ more of the residual's energy per direction than the rest does (F test: an error
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
 
-from tauscope.diagnosis.fitting.fit import Fit
+from tauscope.diagnosis.fitting.fit import Fit, Fitter
 from tauscope.diagnosis.observations.observations import Observations, Piece
 from tauscope.effects.computation import side_by_side
 from tauscope.recording.recording import Array
@@ -159,3 +159,30 @@ def _reach(observations: Observations) -> Array:
     position = np.concatenate([motion.position for motion in motions]).std(axis=0)
     velocity = np.concatenate([motion.velocity for motion in motions]).std(axis=0)
     return np.concatenate([position, velocity])
+
+
+def without_spilled(misfit: LackOfFit, fit: Fit, fitter: Fitter, *, pure_error: bool) -> LackOfFit:
+    """A lack of fit whose joints answer for their own misfit only: they share the links, whose parameters it bends.
+
+    A least-squares fit spreads what is wrong at one joint over every torque that the same masses make. The joint at
+    which most is left is believed to be wrong itself. Fitted without its rows, nothing bends the links for it; what is
+    then still left at another joint is that one's own, and the largest of these is left out next, until no more than
+    noise is left at those that remain.
+    """
+    apart, suspects, wrong = misfit, _significant(misfit), set[int]()
+    if len(suspects) < 2:
+        return misfit
+    while suspects:
+        wrong.add(max(suspects, key=lambda joint: apart.excess[joint]))
+        rows = fitter.observations.without_joints(wrong)
+        apart = lack_of_fit(Fitter(rows).fit(fit.model), rows, pure_error=pure_error)
+        suspects = (_significant(apart) & _significant(misfit)) - wrong
+    spilled = np.isin(np.arange(len(misfit.excess)), list(_significant(misfit) - wrong))
+    tests = ("omnibus", "pure_error", "excess")
+    own = {name: np.where(spilled, getattr(apart, name), getattr(misfit, name)) for name in tests}
+    return replace(misfit, **own)
+
+
+def _significant(misfit: LackOfFit) -> set[int]:
+    """Joints at which more than noise is left."""
+    return {joint for joint, told in enumerate(misfit.significant) if told}

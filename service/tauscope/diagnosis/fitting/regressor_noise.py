@@ -29,7 +29,7 @@ import numpy as np
 
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.observations.observations import Observations, Piece
-from tauscope.diagnosis.observations.row_weighting import RowWeighting
+from tauscope.diagnosis.observations.whitening import RowWeighting
 from tauscope.dynamics import smooth_sign
 from tauscope.recording.conditioning.common_band import Decimator
 from tauscope.recording.conditioning.filters import smooth

@@ -13,10 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauscope.diagnosis.observations.band import STATE_BANDS, quiet_cutoffs, state_cutoffs
-from tauscope.diagnosis.observations.row_weighting import RowWeighting
-from tauscope.diagnosis.observations.spikes import without_spikes
-from tauscope.diagnosis.observations.temperature import read_temperature
-from tauscope.diagnosis.observations.whitening import JointNoise
+from tauscope.diagnosis.observations.channels import read_temperature, without_spikes
+from tauscope.diagnosis.observations.whitening import JointNoise, RowWeighting
 from tauscope.dynamics.base_parameters import BaseParameters
 from tauscope.identification.dataset import Dataset, PreparedMotion
 from tauscope.recording.conditioning import Conditioner

@@ -8,7 +8,6 @@ import numpy as np
 from tauscope.diagnosis.fitting.white_columns import SHAPES_AT_ONCE
 from tauscope.diagnosis.model.term import Place, Term
 from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
-from tauscope.diagnosis.search.neighbourhood import POINTS, neighbours, spread
 from tauscope.diagnosis.search.position_noise import is_position_noise
 from tauscope.diagnosis.search.scoring import SIZES, Scored, Scorer, unnamed_log_odds
 from tauscope.effects import Effect, Signals, TimeLocalEffect
@@ -24,6 +23,7 @@ MOST_SHAPES = 600  # shapes of a grid of thousands that are looked at first
 KINDS = (0, 3)  # shape parameters of a window that are no numbers: its recordings, and its profile
 EDGES = (1, 2)  # …and those that have many optima
 ZOOMS = 2  # how often the neighbourhood of a shape parameter's best value is looked at
+POINTS = 7  # values at once: two zooms of them are a hundredth of the grid's step
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,3 +264,17 @@ def _place(scored: tuple[Scored, Scored]) -> Place:
     """Which effect where."""
     effect = scored[0].effect
     return effect.id, effect.joint
+
+
+def neighbours(effect: Effect, shape: Array, place: int) -> tuple[float, float]:
+    """The grid's values below and above the one at a place of `shape`, (k,), or its bounds."""
+    values = np.unique(effect.grid[:, place])
+    at = int(np.argmin(np.abs(values - shape[place])))
+    low = values[at - 1] if at > 0 else effect.lower[place]
+    high = values[at + 1] if at + 1 < len(values) else effect.upper[place]
+    return float(low), float(high)
+
+
+def spread(low: float, high: float, logarithmic: bool) -> Array:
+    """`POINTS` values of a shape parameter, the ends among them, (p,)."""
+    return np.geomspace(low, high, POINTS) if logarithmic else np.linspace(low, high, POINTS)
