@@ -108,10 +108,7 @@ def carried(mass: float, shape: Array, durations: Sequence[float]) -> tuple[floa
 
 
 def payload_windows(durations: Sequence[float]) -> Array:
-    """Windows (g, 7) in which something may be carried: scope, start, end, profile, and r = 0.
-
-    Within one recording, at the same instants of all, or from one recording on. `durations`: of the recordings [s].
-    """
+    """Windows, (g, 7), of carrying, r = 0: within one recording, at the same instants of all, or from one on."""
     rows = []
     scopes = [(float(place), length) for place, length in enumerate(durations)]
     if len(durations) > 1:

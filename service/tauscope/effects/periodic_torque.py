@@ -81,10 +81,7 @@ def _is_geared(context: ArmContext, joint: int) -> bool:
 
 
 def waves(position: Array, orders: Array) -> Array:
-    """Sines and cosines of orders of a position; of even steps by sin(a + b) and cos(a + b), ten times as quick.
-
-    `position`: (N,), q [rad or m]; `orders`: (g,), k [1/rad or 1/m]. Returns (g, 2, N), sin kq, cos kq.
-    """
+    """Waves sin kq and cos kq, (g, 2, N), of `position`, (N,), and `orders` k, (g,): even steps by sin(a + b)."""
     steps = np.diff(orders)
     if len(steps) < 2 or np.ptp(steps) > EVEN * abs(steps[0]):
         angle = orders[:, None] * position

@@ -98,10 +98,7 @@ class LinearModel:
     def most_probable(
         self, scales: Sequence[Scales], joints: Collection[int], *, anew: bool = True
     ) -> tuple[Scales, ...]:
-        """The scales of highest evidence at some joints, one joint after the other.
-
-        `anew`: whether to look also from a covariance without discrepancy: one optimum has what another has not.
-        """
+        """The scales of highest evidence, joint by joint; `anew`: from a covariance without discrepancy, too."""
         found = list(scales)
         for joint in joints:
             others = [place for place in range(len(self.joints)) if place != joint]

@@ -60,10 +60,7 @@ class JointMoments:
         return 1 + len(self.index)
 
     def against(self, columns: Array) -> tuple[Array, Array]:
-        """Products of other columns with Z, (K, g, 1 + k + b), and of each with itself and its fellows, (K, s, c, c).
-
-        `columns`: (s, c, R), c columns for each of s shapes, g = s c.
-        """
+        """Products of `columns`, (s, c, R), with Z, (K, s c, 1 + k + b), and within each of s shapes, (K, s, c, c)."""
         flat = columns.reshape(-1, columns.shape[-1])
         parts = list(zip(_split(flat, self.bounds), _split(self.rows, self.bounds), strict=True))
         mutual = [own.reshape(*columns.shape[:2], -1) for own, _ in parts]
@@ -105,10 +102,7 @@ class JointMoments:
         )
 
     def weighted(self, scales: Scales) -> Weighted:
-        """Zᵀ C⁻¹ Z by Woodbury's identity.
-
-        C = σ² D + B A² Bᵀ with D = 1 + r² c² of a row's class, A the amplitudes of the features B.
-        """
+        """Zᵀ C⁻¹ Z by Woodbury's identity: C = σ² D + B A² Bᵀ, D = 1 + r² c² by class, A amplitudes of features B."""
         return self._known.get(scales.values.tobytes(), lambda: self._weigh(scales))
 
     def _weigh(self, scales: Scales) -> Weighted:
@@ -128,10 +122,7 @@ class JointMoments:
         return np.asarray((scales.amplitudes(self.groups) * seen) @ self.rows[self.visible :])
 
     def reduced(self, scales: Scales, crossed: Array, mutual: Array) -> tuple[Array, Array]:
-        """Products of other columns with target and columns, (g, 1 + k), and of their fellows, (s, c, c), after C⁻¹.
-
-        `crossed`, `mutual`: (K, g, 1 + k + b), (K, s, c, c), as of `against`.
-        """
+        """Those of `against`, `crossed` and `mutual`, with target and columns, (g, 1 + k) and (s, c, c), after C⁻¹."""
         visible, weights = self.visible, scales.weights()
         known = self.weighted(scales)
         own, fellows = np.tensordot(weights, crossed, axes=1), np.tensordot(weights, mutual, axes=1)
@@ -141,10 +132,7 @@ class JointMoments:
         return own[:, :visible] - seen.T @ known.half, fellows - np.einsum("bsc,bsd->scd", by_shape, by_shape)
 
     def slopes(self, scales: Scales, direction: Array, covariance: Array) -> Array:
-        """Slopes of uᵀ Z C⁻¹ Zᵀ u + tr(V X C⁻¹ Xᵀ) + log det C in each of the scales, (s,).
-
-        `direction`: (1 + k,), u; `covariance`: (k, k), V, of the columns' parameters.
-        """
+        """∂/∂scales of uᵀ Z C⁻¹ Zᵀ u + tr(V X C⁻¹ Xᵀ) + log det C, (s,), `direction` u, `covariance` V, (k, k)."""
         visible, weights, counts = self.visible, scales.weights(), self.counts
         amplitudes = scales.amplitudes(self.groups)
         known = self.weighted(scales)

@@ -90,10 +90,7 @@ class EvidenceRows:
     def moments(
         self, model: ExtendedModel, dependence: Sequence[float], *, owned: bool = False
     ) -> tuple[JointMoments, ...]:
-        """Residual of a model and its slopes in all parameters, one entry a joint.
-
-        The discrepancy is beyond what the nominal model can make; where terms are `owned`, beyond what they can, too.
-        """
+        """Residual and slopes, by joint; the discrepancy is beyond nominal columns, or beyond all that are `owned`."""
         return tuple(self._joint_moments(joint, model, own, owned=owned) for joint, own in enumerate(dependence))
 
     def _joint_moments(self, joint: int, model: ExtendedModel, dependence: float, *, owned: bool) -> JointMoments:
@@ -109,10 +106,7 @@ class EvidenceRows:
     def joint_moments(
         self, joint: int, residual: Array, linear: JointColumns, dependence: float, plain: int
     ) -> JointMoments:
-        """Those of one joint, with a discrepancy beyond the columns of the first parameters.
-
-        `residual`: (R,), white rows; `dependence`: κ; `plain`: number of parameters that the discrepancy leaves alone.
-        """
+        """Those of one joint's white `residual`, (R,), its discrepancy beyond the columns of `plain` parameters."""
         columns, smooth = self.take(joint, linear.rows, dependence), self.groups[joint] >= 0
         features = self.take(joint, self.features[joint], dependence)
         features[smooth] = beyond(columns[linear.index < plain], features[smooth])

@@ -87,8 +87,7 @@ class HeldOutChange:
 
         Where a torque f is there, leaving it out costs Σ f² ± 2σ √(κ Σ f²) in white noise σ whose rows count as 1/κ:
         the change expected is z_e = √(Σ f²/κ) / 2σ, and a change z has the likelihood ratio exp(2 z z_e). So the noise
-        need not be known, and luck that exceeds what the torque can do says no more than the torque would. `joints`:
-        that count, from 0.
+        need not be known, and luck that exceeds what the torque can do says no more than the torque would.
         """
         size = np.abs(self.standard) if self.expected is None else np.minimum(np.abs(self.standard), self.expected)
         own = -2.0 * self.standard * size

@@ -19,10 +19,7 @@ POSES = 200  # of a motion, by which the mean of an inertia is told
 
 
 def nominal_model(identification: Identification) -> ExtendedModel:
-    """The identified model with its friction curves' constants free, also those that the robot file states.
-
-    Rotors, which an identification adds where the data ask for them, are left out: they are effects.
-    """
+    """The identified model, its friction curves' constants free, stated ones too, without rotors: they are effects."""
     constants: list[ShapeParameter] = []
     stated: list[float | None] = []
     for joint, terms in enumerate(identification.structure.terms):

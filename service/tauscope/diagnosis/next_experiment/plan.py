@@ -80,13 +80,7 @@ def plan_experiment(diagnosis: Diagnosis, progress: Callable[[str], None] = lamb
 def planned_experiment(
     diagnosis: Diagnosis, progress: Callable[[str], None] = lambda step: None, *, asked: bool = False
 ) -> PlannedExperiment | None:
-    """The recording to make next where anything is open, None where nothing is or the limits allow no motion.
-
-    Raises
-    ------
-    ExcitationError
-        where a motion was asked for and the arm's limits allow none
-    """
+    """The next recording, None where nothing is open or possible. Raises ExcitationError if `asked` in vain."""
     if not asked and not is_wanted(diagnosis):
         return None
     try:

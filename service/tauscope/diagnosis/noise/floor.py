@@ -39,11 +39,8 @@ def repeated_differences(
 ) -> Iterator[tuple[Array, NDArray[np.bool_], float]]:
     """What the residual of a period differs by from that of the period before: noise, whatever the model lacks.
 
-    Yields
-    ------
-    tuple of (n, M) float64, (n, M) bool and float
-        rows in the common band, which of them rest on measured torque, and the factor that turns their power into the
-        noise's
+    Rows in the common band, (n, M), which of them rest on measured torque, (n, M), and the factor that turns their
+    power into the noise's.
     """
     for piece in observations:
         motion = piece.prepared.motion

@@ -81,10 +81,9 @@ def _within(bands: Array, cutoff_hz: float) -> Array:
 
 
 def step_bands(conditioner: Conditioner, steepness: Array, blurred: float) -> Array:
-    """Bands in which noise of density D makes K_v √(D (2π)² f³/3) of `blurred`, (n,) [Hz].
+    """Bands in which noise of density D makes K_v √(D (2π)² f³/3), K_v `steepness`, (n,), of `blurred`, (n,) [Hz].
 
-    There is no limit, and the band infinite, where a joint does not move or its positions have no noise. `steepness`:
-    (n,), K_v of every joint's friction [s/rad or s/m].
+    There is no limit, and the band infinite, where a joint does not move or its positions have no noise.
     """
     density = conditioner.noise.density
     widths = 3.0 * (blurred / np.maximum(steepness, 1e-9)) ** 2 / (4.0 * np.pi**2)

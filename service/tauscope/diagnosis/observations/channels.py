@@ -15,11 +15,7 @@ OF_MEDIAN = 1.4826  # standard deviation of a Gaussian over the median of its ma
 
 
 def read_temperature(conditioner: Conditioner, time: Array) -> Array | None:
-    """Temperature of every joint.
-
-    Returns (n, P, N), [°C]; NaN at joints without a sensor, None where there is none. `time`: (P, N), instants on the
-    recording's clock [s].
-    """
+    """Temperature of all joints at `time`, (P, N), (n, P, N) [°C]; NaN at joints without a sensor, None without any."""
     if not conditioner.recording.has("temp"):
         return None
     parts = [(each.time, each.temperature) for each in conditioner.usable_samples() if each.temperature is not None]

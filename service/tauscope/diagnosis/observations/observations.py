@@ -78,11 +78,10 @@ class Piece:
         return rows if self.repetitions == 1 else np.tile(rows, (1, self.repetitions))
 
     def without_noise_of_inertia(self, values: Array) -> Array:
-        """Accelerations, or torque of the links (n, N), without what lies far above the common band.
+        """Accelerations or torque of links, `values`, (n, N), without what lies far above the common band.
 
         Friction's step needs the motion's whole band; inertia does not, and multiplies that band's noise by the square
-        of its frequency, which a column that is not linear in it would fold back. `values`: (n, N), at the recorded
-        rate.
+        of its frequency, which a column that is not linear in it would fold back.
         """
         if self.rigid_hz is None:
             return np.ascontiguousarray(values)

@@ -93,11 +93,7 @@ class Proposer:
         instead: Place | None = None,
         looks: Looks | None = None,
     ) -> list[Proposal]:
-        """Effects that make the data more probable, the most probable first.
-
-        `instead`: effect in whose place they are looked for; None where they are to be added.
-        `looks`: what is known of them, to which this adds.
-        """
+        """Effects that make the data more probable, most first, added or `instead` of one; fills in `looks`."""
         looks = looks or Looks()
         independent = self.laboratory.under(at, [1.0] * len(at.scales), range(len(at.scales)))
         scorer = Scorer(self.rows, independent)
@@ -201,10 +197,7 @@ class Proposer:
     def zoom(
         self, effect: Effect, shape: Array, size: Array, at: Hypothesis, signals: Sequence[Signals]
     ) -> tuple[Array, Array]:
-        """One shape parameter after the other: a free one between neighbours on the grid, a window's kind in turn.
-
-        `shape`: (k,), where it begins; `size`: (c,), standard deviation believed of the coefficients there.
-        """
+        """Parameters of `shape`, (k,), in turn, beside `size`, (c,): free ones between neighbours, a window's kind."""
         scorer = Scorer(self.rows, at)
 
         def choose(values: Array, place: int) -> int | None:

@@ -66,11 +66,7 @@ class Scorer:
         self._settings = [(scales, at.linear.posterior(scales)) for scales in (at.scales, self._plain)]
 
     def score(self, effect: Effect, shapes: Array, columns: Mapping[int, Array]) -> tuple[Scored, Scored]:
-        """Shapes of an effect beside the discrepancy, and as if there were none.
-
-        `shapes`: (s, k), values of its shape parameters.
-        `columns`: mapping of int to (s, c, R_j), its white rows at every joint that it touches, by class of rest.
-        """
+        """`shapes`, (s, k), of an effect, of white `columns`, (s, c, R_j) by joint, beside the discrepancy and not."""
         joints = self._at.linear.joints
         crossed = {joint: joints[joint].against(own) for joint, own in columns.items()}
         shares = self._shares(columns)
