@@ -30,24 +30,6 @@ from tauscope.errors import IdentificationError
 from tauscope.identification import Options
 from tauscope.recording.recording import Array, Recording
 
-
-def payload_finding(diagnosis: Diagnosis, carried: Explanation) -> Finding:
-    """The payload as a finding; the model without it keeps everything else."""
-    model = diagnosis.selection.fit.model
-    parameters = model.parameters.copy()
-    parameters[: len(carried.effect)] -= carried.effect
-    effect = Payload(None, np.zeros((1, 3)), np.full(3, -FARTHEST_M), np.full(3, FARTHEST_M))
-    return Finding(
-        terms=(Term(effect, carried.values[1:], carried.values[:1]),),
-        covariances=(carried.covariance,),
-        gain=carried.gain * diagnosis.inflation,
-        probability=float(1.0 / (1.0 + np.exp(-carried.log_odds))),
-        before=diagnosis.sizes(replace(model, parameters=parameters)),
-        after=diagnosis.after,
-        in_model=False,
-    )
-
-
 CHANCE = 0.01  # chance of calling any parameter wrong where all are right
 NEGLIGIBLE = 1e-3  # part of the larger value below which two values are the same for all purposes
 LACKED = 0.02  # part of the real value below which a simulator's own estimate of a term says that it has none
@@ -101,12 +83,9 @@ def against_simulation(diagnosis: Diagnosis, simulated: Sequence[Recording], opt
     values = dict(zip(names, (float(value) for value in fit.values), strict=True))
     std = dict(zip(names, np.sqrt(np.diag(fit.covariance)), strict=True))
     real = dict(zip(names, diagnosis.selection.fit.model.parameters, strict=True))
-    terms = [(joint, term) for joint in range(diagnosis.robot.joint_count) for term in TERMS]
-    lacking = []
-    for joint, term in terms:
-        name = f"{term} {diagnosis.robot.joints[joint].name}"
-        if name in values and abs(values[name]) < max(LACKED * abs(real[name]), 5.0 * std[name]):
-            lacking.append((joint, term))
+    small = {name for name in values if abs(values[name]) < max(LACKED * abs(real[name]), 5.0 * std[name])}
+    joints = enumerate(diagnosis.robot.joints)
+    lacking = [(joint, term) for joint, own in joints for term in TERMS if f"{term} {own.name}" in small]
     missing = tuple(finding for finding in diagnosis.findings if finding.place not in fit.shared)
     given = Given(values, tuple(lacking), fit.covariance)
     given = replace(given, links=_simulated_links(diagnosis, given))
@@ -198,6 +177,23 @@ def _attribution(diagnosis: Diagnosis, given: Given, real: Array, covariance: Ar
     return Attribution(base, real - stated, covariance + same, given.links, believed)
 
 
+def payload_finding(diagnosis: Diagnosis, carried: Explanation) -> Finding:
+    """The payload as a finding; the model without it keeps everything else."""
+    model = diagnosis.selection.fit.model
+    parameters = model.parameters.copy()
+    parameters[: len(carried.effect)] -= carried.effect
+    effect = Payload(None, np.zeros((1, 3)), np.full(3, -FARTHEST_M), np.full(3, FARTHEST_M))
+    return Finding(
+        terms=(Term(effect, carried.values[1:], carried.values[:1]),),
+        covariances=(carried.covariance,),
+        gain=carried.gain * diagnosis.inflation,
+        probability=float(1.0 / (1.0 + np.exp(-carried.log_odds))),
+        before=diagnosis.sizes(replace(model, parameters=parameters)),
+        after=diagnosis.after,
+        in_model=False,
+    )
+
+
 def _several(count: int) -> float:
     """Standard errors by which one of so many parameters differs by chance alone in `CHANCE` of all cases."""
     return float(stats.norm.isf(0.5 * CHANCE / max(count, 1)))
@@ -236,21 +232,19 @@ def compare_with_saved(diagnosis: Diagnosis, saved: ExtendedModel) -> Diagnosis:
     found = compare_with(
         keep_missing(diagnosis, missing), Given(values, lacking, _align_covariance(diagnosis, saved)), "model"
     )
-    differences: list[ParameterDifference] = []
-    for finding in diagnosis.findings:
-        if finding.place not in had:
-            continue
-        own, given = on_the_arm(diagnosis.selection.fit.model, finding.terms[0]), on_the_arm(saved, had[finding.place])
-        std = np.sqrt(np.maximum(np.diag(finding.covariances[0]), 0.0))
-        for place, coefficient in enumerate(own.effect.coefficients[: len(given.coefficients)]):
-            differences.append(
-                ParameterDifference(
-                    f"{coefficient.name} of {own.effect.name(joints)}",
-                    float(given.coefficients[place]),
-                    float(own.coefficients[place]),
-                    float(std[place]),
-                )
-            )
+    differences = [
+        ParameterDifference(f"{each.name} of {own.effect.name(joints)}", float(given), float(value), float(std))
+        for finding in diagnosis.findings
+        if finding.place in had
+        for own in [on_the_arm(diagnosis.selection.fit.model, finding.terms[0])]
+        for each, given, value, std in zip(
+            own.effect.coefficients,
+            on_the_arm(saved, had[finding.place]).coefficients,
+            own.coefficients,
+            np.sqrt(np.maximum(np.diag(finding.covariances[0]), 0.0)),
+            strict=False,
+        )
+    ]
     wrong = [each for each in differences if is_wrong(each, CLEAR)]
     before = diagnosis.sizes(saved)
     return replace(found, differences=sort_differences([*found.differences, *wrong]), before=before)

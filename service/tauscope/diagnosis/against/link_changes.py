@@ -82,28 +82,19 @@ def _changes(link: int, stated: Array | None, spread: Array) -> Iterator[LinkCha
     yield LinkChange(link, QUANTITIES, std, _along(unit))
     reach = np.maximum(std[MOMENTS] / std[MASS], USUAL_M)
     body = ("mass", *(f"centre_of_mass_{axis}" for axis in AXES))
-    yield LinkChange(link, body, np.append(std[MASS], reach), _point_mass, is_linear=False, is_point_mass=True)
+    spreads = np.append(std[MASS], reach)
+    yield LinkChange(link, body, spreads, lambda at: at[0] * unit_body(at[1:]), is_linear=False, is_point_mass=True)
     if stated is None or stated[MASS] <= 0.0:
         return
-    centre = stated[MOMENTS] / stated[MASS]
+    mass, centre = float(stated[MASS]), stated[MOMENTS] / stated[MASS]
     scale, at_centre = stated / stated[MASS], unit_body(centre)
     yield LinkChange(link, ("mass",), std[[MASS]], _along(scale[:, None]))
     yield LinkChange(link, ("mass",), std[[MASS]], _along(at_centre[:, None]))
-    yield LinkChange(link, body[1:], reach, _other_centre(float(stated[MASS]), centre), is_linear=False)
+    yield LinkChange(link, body[1:], reach, lambda by: mass * (unit_body(centre + by) - at_centre), is_linear=False)
 
 
 def _along(columns: Array) -> Callable[[Array], Array]:
     return lambda values: columns @ values
-
-
-def _point_mass(values: Array) -> Array:
-    """A mass at a place; β = (m, r)."""
-    return values[0] * unit_body(values[1:])
-
-
-def _other_centre(mass: float, centre: Array) -> Callable[[Array], Array]:
-    """The same body with its centre of mass moved by β."""
-    return lambda moved: mass * (unit_body(centre + moved) - unit_body(centre))
 
 
 def stated_links(links: tuple[LinkInertia, ...]) -> Array:

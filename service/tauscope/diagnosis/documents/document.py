@@ -63,7 +63,7 @@ def document(
         joints=names,
         against=diagnosis.against,
         verdict=diagnosis.verdict.value,
-        noise_std=_floats(diagnosis.noise_std),
+        noise_std=diagnosis.noise_std.tolist(),
         noise_method="periods" if noise_method == "periods" else "residual",
         cutoff_hz=diagnosis.cutoff_hz,
         mismatch=[
@@ -96,16 +96,12 @@ def parameter_names(diagnosis: Diagnosis) -> list[str]:
     return names
 
 
-def _floats(values: np.ndarray) -> list[float]:
-    return [float(value) for value in values]
-
-
 def _fit_changes(diagnosis: Diagnosis) -> FitChangesEntry:
     before, after = diagnosis.before, diagnosis.after
     held_out = None
     if before.held_out is not None and after.held_out is not None:
-        held_out = FitChangeEntry(rms_before=_floats(before.held_out), rms_after=_floats(after.held_out))
-    train = FitChangeEntry(rms_before=_floats(before.train), rms_after=_floats(after.train))
+        held_out = FitChangeEntry(rms_before=before.held_out.tolist(), rms_after=after.held_out.tolist())
+    train = FitChangeEntry(rms_before=before.train.tolist(), rms_after=after.train.tolist())
     return FitChangesEntry(train=train, held_out=held_out)
 
 
@@ -208,10 +204,10 @@ def _finding(finding: Finding, diagnosis: Diagnosis, names: Sequence[str], *, te
         share=_share(finding, diagnosis, tentative=tentative),
         confirmed=False if tentative else finding.confirmed,
         held_out_change=_held_out_change(finding),
-        rms_before=_floats(before.train),
-        rms_after=_floats(after.train),
-        held_out_rms_before=None if before.held_out is None else _floats(before.held_out),
-        held_out_rms_after=None if after.held_out is None else _floats(after.held_out),
+        rms_before=before.train.tolist(),
+        rms_after=after.train.tolist(),
+        held_out_rms_before=None if before.held_out is None else before.held_out.tolist(),
+        held_out_rms_after=None if after.held_out is None else after.held_out.tolist(),
     )
 
 
@@ -254,8 +250,8 @@ def _held_out_change(finding: Finding) -> HeldOutChangeEntry | None:
     change = finding.held_out_change
     if change is None:
         return None
-    std = [error if np.isfinite(error) else None for error in _floats(change.error)]
-    return HeldOutChangeEntry(relative=_floats(change.relative), std=std)
+    std = [error if np.isfinite(error) else None for error in change.error.tolist()]
+    return HeldOutChangeEntry(relative=change.relative.tolist(), std=std)
 
 
 def _unknown(diagnosis: Diagnosis, names: Sequence[str]) -> list[FindingEntry]:
@@ -263,7 +259,7 @@ def _unknown(diagnosis: Diagnosis, names: Sequence[str]) -> list[FindingEntry]:
     if diagnosis.verdict is not Verdict.UNEXPLAINED:
         return []
     before = diagnosis.before
-    held_out = None if before.held_out is None else _floats(before.held_out)
+    held_out = None if before.held_out is None else before.held_out.tolist()
     entries = [
         FindingEntry(
             effect=UNKNOWN,
@@ -277,8 +273,8 @@ def _unknown(diagnosis: Diagnosis, names: Sequence[str]) -> list[FindingEntry]:
             ).text,
             gain=float(diagnosis.misfit_before.excess[found.joint]),
             confirmed=None,
-            rms_before=_floats(before.train),
-            rms_after=_floats(diagnosis.after.train),
+            rms_before=before.train.tolist(),
+            rms_after=diagnosis.after.train.tolist(),
             held_out_rms_before=held_out,
             held_out_rms_after=held_out,
         )
@@ -327,17 +323,19 @@ def _open_question(diagnosis: Diagnosis, names: Sequence[str]) -> tuple[list[str
         return [], f"{_reason(diagnosis)}: {_WIDE}"
     for finding in diagnosis.findings:
         if finding.alternatives:
-            effects = [finding.terms[0].effect, *(rival.term.effect for rival in finding.alternatives)]
-            motions = dict.fromkeys(effect.revealing_motion for effect in effects)
-            return [effect.name(names) for effect in effects], "record " + "; and ".join(motions)
+            return _tell_apart(
+                [term.effect for term in (finding.terms[0], *(rival.term for rival in finding.alternatives))], names
+            )
     if diagnosis.verdict in OPEN:
         why = "repeat the same motion several times and slower: what repeats with time, angle or speed shows its kind"
         return [UNKNOWN], why
-    if diagnosis.tentative:
-        effects = [finding.terms[0].effect for finding in diagnosis.tentative]
-        motions = dict.fromkeys(effect.revealing_motion for effect in effects)
-        return [effect.name(names) for effect in effects], "record " + "; and ".join(motions)
-    return [], ""
+    return _tell_apart([finding.terms[0].effect for finding in diagnosis.tentative], names)
+
+
+def _tell_apart(effects: Sequence[Effect], names: Sequence[str]) -> tuple[list[str], str]:
+    """Names of effects, and the motions that reveal them; empty without any."""
+    motions = dict.fromkeys(effect.revealing_motion for effect in effects)
+    return [effect.name(names) for effect in effects], "record " + "; and ".join(motions) if motions else ""
 
 
 def _reason(diagnosis: Diagnosis) -> str:

@@ -33,7 +33,8 @@ def conclude(identification: Identification, searched: Searched) -> Diagnosis:
     """All that a search comes to."""
     nominal, final = searched.found.nominal, searched.found.hypothesis
     rows = rows_under(final, searched.rows, pure_error=searched.pure_error)
-    fitter, unseen = Fitter(rows), _unseen(searched, final, rows)
+    fitter, held_out = Fitter(rows), searched.unseen
+    unseen = None if held_out is None else Unseen(weigh(held_out.with_noise(rows.noise), final))
     before, after = _fit(nominal, fitter), _fit(final, fitter)
     if not final.model.terms:  # the best of possible bodies is the one that the identification delivers
         before = after = replace(fitter.projected(delivered_model(identification)), spread=after.spread)
@@ -69,13 +70,6 @@ def conclude(identification: Identification, searched: Searched) -> Diagnosis:
         fitter=fitter,
         held_out=unseen,
     )
-
-
-def _unseen(searched: Searched, at: Hypothesis, rows: Observations) -> Unseen | None:
-    """Held-out rows under the noise of training."""
-    if searched.unseen is None:
-        return None
-    return Unseen(weigh(searched.unseen.with_noise(rows.noise), at))
 
 
 def _rows(unseen: Unseen | None) -> Observations | None:

@@ -75,11 +75,9 @@ def detectable(forms: Sequence[Visibility], level: float, inflation: float) -> t
     for each in forms:
         key = (each.effect.id, each.effect.joint)
         unit = each.effect.coefficients[0].unit
-        if each.information <= 0.0:
-            best.setdefault(key, Detectable(*key, None, unit, False))
-            continue
-        size = float(np.sqrt(each.needed_strength(level) * inflation / each.information))
-        if size > each.effect.coefficients[0].largest:  # nothing real is as large as that
+        shows = each.information > 0.0
+        size = float(np.sqrt(each.needed_strength(level) * inflation / each.information)) if shows else np.inf
+        if not shows or size > each.effect.coefficients[0].largest:  # nothing real is as large as that
             best.setdefault(key, Detectable(*key, None, unit, False))
             continue
         known = best.get(key)

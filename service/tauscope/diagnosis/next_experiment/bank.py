@@ -106,7 +106,7 @@ class Bank:
         for _ in range(MOST_TAKEN_BACK):
             segment = sweep(self._limits, share, DURATION_S)
             motion = segment.evaluate(np.linspace(0.0, segment.duration_s, CHECKED))
-            if self._usage(motion) <= 1.0:
+            if self._states.largest(motion) <= 1.0:
                 yield Primitive(f"sweeps at {100.0 * share:.0f} % of the top speed", self._trajectory(segment))
                 return
             share *= TAKEN_BACK
@@ -120,9 +120,6 @@ class Bank:
         slow = slow_part(self._robot, series, self._limits, self._states, SLOW_POSTURES)
         if slow.segments:
             yield Primitive("slow reversals in several postures", self._trajectory(*slow.segments))
-
-    def _usage(self, motion: MotionSamples) -> float:
-        return self._states.largest(motion)
 
     def _trajectory(self, *segments: object) -> Trajectory:
         names = tuple(joint.name for joint in self._robot.joints)
