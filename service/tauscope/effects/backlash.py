@@ -13,7 +13,7 @@ from scipy.ndimage import map_coordinates
 
 from tauscope.effects.context import ArmContext
 from tauscope.effects.deflection import BAND, Deflection
-from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, Sizes, mesh, size_text
+from tauscope.effects.effect import Coefficient, Effect, Quantities, Shape, Sizes, mesh, size_text
 from tauscope.recording.recording import Array
 
 GAPS = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])  # gaps looked at, relative to the joint's range of motion
@@ -128,9 +128,7 @@ class Backlash(Deflection):
         """The same with teeth that give way, one a joint whose link has an inertia."""
         return SpringyTeeth.forms(context)
 
-    def quantities(
-        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
-    ) -> tuple[Quantity, ...]:
+    def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:
         """b; where the link crosses more than it is found to move by, what it crosses.
 
         A bounce at another instant than the model's adds nothing to how far the link moves; of how long it flies they

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from tauscope.dynamics import torque_regressor
 from tauscope.effects.computation import THREADS, LastFew
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Effect, Quantity, Shape
+from tauscope.effects.effect import Effect, Quantities, Shape
 from tauscope.recording.recording import Array
 
 # Step of the difference quotient by position [rad or m]: far above rounding, far below the curvature of any sine.
@@ -51,9 +51,7 @@ class Deflection(Effect):
     def touched(self, joint_count: int) -> tuple[int, ...]:
         return tuple(range(joint_count))
 
-    def quantities(
-        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
-    ) -> tuple[Quantity, ...]:
+    def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:
         """The size of the deflection, its standard error with that of the first order."""
         found = super().quantities(context, coefficients, shape, covariance)
         return tuple(replace(each, std=float(np.hypot(each.std, FIRST_ORDER * each.value))) for each in found)

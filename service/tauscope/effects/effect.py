@@ -67,6 +67,7 @@ class Quantity:
         return replace(self, value=1e3 * self.value, std=1e3 * self.std, unit="ms", period=1e3 * self.period)
 
 
+Quantities = tuple[Quantity, ...]  # parameters of a finding in their order
 Sizes = Mapping[str, Quantity]  # parameters of a finding by name
 
 
@@ -209,9 +210,7 @@ class Effect(ABC):
         kind = context.robot.joints[joint or 0].type
         return template.format(tau=_TORQUE[kind], q=_POSITION[kind])
 
-    def quantities(
-        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
-    ) -> tuple[Quantity, ...]:
+    def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:
         """A finding's parameters: coefficients, (c,), then shape, (k,), with their `covariance`, (c + k, c + k)."""
         std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         names = (*self.coefficients, *self.shapes)

@@ -7,7 +7,7 @@ import numpy as np
 from scipy import signal
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, Sizes, size_text
+from tauscope.effects.effect import Coefficient, Effect, Quantities, Quantity, Shape, Sizes, size_text
 from tauscope.recording.recording import Array
 
 TIMES = np.array([0.08, 0.2, 0.5, 1.2, 3.0])  # time constants looked at, relative to the longest recording
@@ -121,9 +121,7 @@ class ThermalDrift(FrictionDrift):
         own = np.stack([signals.step[joint], signals.velocity[joint]])
         return (own[None, :, None, :] * course[:, None])[:, :, None]
 
-    def quantities(
-        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
-    ) -> tuple[Quantity, ...]:
+    def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:
         return (
             *super().quantities(context, coefficients, shape, covariance),
             Quantity("T_0", self.reference_c, 0.0, "°C"),

@@ -8,7 +8,7 @@ from scipy.linalg import solve_banded
 
 from tauscope.effects.context import ArmContext
 from tauscope.effects.deflection import BAND, Deflection
-from tauscope.effects.effect import Coefficient, Effect, Quantity, Shape, Sizes, size_text
+from tauscope.effects.effect import Coefficient, Effect, Quantities, Quantity, Shape, Sizes, size_text
 from tauscope.recording.recording import Array
 
 # Bands to which the load is smoothed, relative to the common one; the widest passes all that is compared there.
@@ -75,9 +75,7 @@ class JointElasticity(Deflection):
             lower[1], upper[1] = coefficients[0] / SAME, coefficients[0] * SAME
         return lower, upper
 
-    def quantities(
-        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
-    ) -> tuple[Quantity, ...]:
+    def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:
         """c; where the link swings, the mean of what gives way and what it swings on: both estimate one compliance.
 
         The load of a resonance is known only within a band, which errs the one way in the amplitude and the other way

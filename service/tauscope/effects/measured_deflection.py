@@ -9,7 +9,7 @@ import numpy as np
 
 from tauscope.effects.backlash import BANDS, LOSSES, SPRINGY_BAND, Backlash, SpringyTeeth
 from tauscope.effects.context import ArmContext
-from tauscope.effects.effect import Quantity, mesh
+from tauscope.effects.effect import Quantities, Quantity, mesh
 from tauscope.effects.joint_elasticity import BANDS as LOAD_BANDS
 from tauscope.effects.joint_elasticity import JointElasticity
 from tauscope.recording.recording import Array
@@ -33,9 +33,7 @@ class MeasuredElasticity(JointElasticity):
         grid = mesh(LOAD_BANDS * context.cutoff_hz, np.array(swings))
         return cls(joint, grid, grid.min(axis=0), grid.max(axis=0), compliance, std)
 
-    def quantities(
-        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
-    ) -> tuple[Quantity, ...]:
+    def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:
         return (Quantity("c", self.compliance, self.compliance_std, self.unit("{q}/{tau}", context)),)
 
 
@@ -60,9 +58,7 @@ class MeasuredPlay(Backlash):
         """No shape: the encoder shows the gap."""
         return False
 
-    def quantities(
-        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
-    ) -> tuple[Quantity, ...]:
+    def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:
         return (Quantity("b", self.play, self.play_std, self.unit("{q}", context)),)
 
 
@@ -90,9 +86,7 @@ class MeasuredTeeth(SpringyTeeth):
         """No shape: the encoder shows gap and compliance."""
         return False
 
-    def quantities(
-        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
-    ) -> tuple[Quantity, ...]:
+    def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:
         return (
             Quantity("b", self.play, self.play_std, self.unit("{q}", context)),
             Quantity("c", self.compliance, self.compliance_std, self.unit("{q}/{tau}", context)),

@@ -9,7 +9,7 @@ import numpy as np
 
 from tauscope.effects.carried_body import FARTHEST_M, MASS, PLACE, body_columns, body_quantities, unit_body
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Effect, Quantity, Sizes, size_text
+from tauscope.effects.effect import Effect, Quantities, Sizes, size_text
 from tauscope.recording.recording import Array
 
 
@@ -47,7 +47,5 @@ class Payload(Effect):
     def advice(self, found: Sizes) -> str:
         return self.remedy if found["m"].value >= 0.0 else "lower the mass of the last link"
 
-    def quantities(
-        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
-    ) -> tuple[Quantity, ...]:
+    def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:
         return tuple(body_quantities(float(coefficients[0]), shape, covariance))

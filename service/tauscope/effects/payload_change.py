@@ -6,7 +6,7 @@ import numpy as np
 
 from tauscope.effects.carried_body import FARTHEST_M, MASS, PLACE, body_columns, body_quantities, unit_body
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Effect, Entry, Quantity, Shape, Sizes, size_text
+from tauscope.effects.effect import Effect, Entry, Quantities, Quantity, Shape, Sizes, size_text
 from tauscope.effects.time_local import EVERY, OUTSIDE, TimeLocalEffect, since
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
@@ -56,9 +56,7 @@ class PayloadChange(TimeLocalEffect):
         """Torque of one kilogramme at r, (1, n, N)."""
         return np.tensordot(unit_body(shape[4:]), body_columns(signals), axes=1)[None]
 
-    def quantities(
-        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
-    ) -> tuple[Quantity, ...]:
+    def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:
         body = (0, 5, 6, 7)
         sign, instants = carried(float(coefficients[0]), shape, context.durations)
         found = list(body_quantities(sign * float(coefficients[0]), shape[4:], covariance[np.ix_(body, body)]))

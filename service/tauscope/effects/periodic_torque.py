@@ -17,6 +17,7 @@ from tauscope.effects.effect import (
     Coefficient,
     Effect,
     Entry,
+    Quantities,
     Quantity,
     Shape,
     Sizes,
@@ -130,9 +131,7 @@ class _Periodic(Effect):
     def is_free(self, place: int) -> bool:
         return not self.geared
 
-    def quantities(
-        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
-    ) -> tuple[Quantity, ...]:
+    def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:
         """Amplitude, phase and order instead of sine and cosine."""
         sine, cosine = (float(value) for value in coefficients)
         amplitude = float(np.hypot(sine, cosine)) or 1e-300

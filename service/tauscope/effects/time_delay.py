@@ -7,7 +7,7 @@ import numpy as np
 from scipy import signal
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape, Sizes, size_text
+from tauscope.effects.effect import Coefficient, Effect, Entry, Quantities, Quantity, Shape, Sizes, size_text
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -102,9 +102,7 @@ class Shift(LateTorque):
         recorded = np.stack([self.late(torque, float(constant), signals) for constant in shapes[:, 0]])
         return (recorded - torque)[:, None]
 
-    def quantities(
-        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
-    ) -> tuple[Quantity, ...]:
+    def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:
         """The mean delay d = a T: it is known well also where a and T are not."""
         share, constant = float(coefficients[0]), float(shape[0])
         slope = np.array([constant, share])
@@ -143,9 +141,7 @@ class Lag(Shift):
         """Torque (m, N) behind the filter."""
         return low_passed(torque, constant, self.order, signals)
 
-    def quantities(
-        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
-    ) -> tuple[Quantity, ...]:
+    def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:
         (each,) = super().quantities(context, coefficients, shape, covariance)
         own = float(np.sqrt(max(covariance[1, 1], 0.0)))
         return (

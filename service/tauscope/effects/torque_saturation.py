@@ -7,7 +7,17 @@ from math import sqrt
 import numpy as np
 
 from tauscope.effects.context import ArmContext, Signals
-from tauscope.effects.effect import Coefficient, Effect, Entry, Quantity, Shape, Sizes, per_joint_columns, size_text
+from tauscope.effects.effect import (
+    Coefficient,
+    Effect,
+    Entry,
+    Quantities,
+    Quantity,
+    Shape,
+    Sizes,
+    per_joint_columns,
+    size_text,
+)
 from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
@@ -83,9 +93,7 @@ class TorqueSaturation(Saturation):
         lower[0] = self.lower[0] * np.sqrt(coefficients[0])
         return lower, upper
 
-    def quantities(
-        self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array
-    ) -> tuple[Quantity, ...]:
+    def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:
         share, level = max(float(coefficients[0]), 1e-12), float(shape[0])
         slope = np.array([-0.5 * level / share**1.5, 1.0 / np.sqrt(share)])
         std = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))

@@ -28,7 +28,6 @@ from tauscope.diagnosis.findings.finding import Finding
 from tauscope.diagnosis.findings.location import JointMismatch, Place
 from tauscope.diagnosis.findings.verdict import OPEN, Verdict
 from tauscope.diagnosis.findings.wrong_value import WrongValue
-from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.model.torque_scale import on_the_arm
 from tauscope.diagnosis.next_experiment import PlannedExperiment
 from tauscope.effects import Effect, Quantity, effect_class
@@ -224,17 +223,10 @@ def _quantities(finding: Finding, diagnosis: Diagnosis) -> list[Quantity]:
     found: list[Quantity] = []
     for number, (term, covariance) in enumerate(zip(finding.terms, finding.covariances, strict=True), start=1):
         sized = on_the_arm(diagnosis.selection.fit.model, term)
-        own = _told(sized, diagnosis, covariance)
+        own = sized.effect.quantities(diagnosis.setting, sized.coefficients, sized.shape, covariance)
         suffix = "" if number == 1 else f"_{number}"
         found += [Quantity(f"{each.name}{suffix}", each.value, each.std, each.unit) for each in own]
     return found
-
-
-def _told(term: Term, diagnosis: Diagnosis, covariance: Array | None = None) -> tuple[Quantity, ...]:
-    """The parameters of one term; without standard errors where their covariance is not given."""
-    if covariance is None:
-        covariance = np.zeros((len(term.coefficients) + len(term.shape),) * 2)
-    return term.effect.quantities(diagnosis.setting, term.coefficients, term.shape, covariance)
 
 
 def _share(finding: Finding, diagnosis: Diagnosis, *, tentative: bool) -> float | None:
