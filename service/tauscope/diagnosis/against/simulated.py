@@ -55,7 +55,7 @@ def fit_to_simulation(diagnosis: Diagnosis, simulated: Sequence[Recording], opti
 def _quieter_noise(rows: Observations, start: ExtendedModel) -> list[JointNoise]:
     """Noise of every joint beside the model that leaves less there: with the arm's effects, or without them."""
     share = band_share(rows)
-    pairs = zip(*(white_noise(rows, model, share) for model in (start, start.without_terms())), strict=True)
+    pairs = zip(*(white_noise(rows, model, share) for model in (start, with_terms(start, ()))), strict=True)
     return [min(pair, key=lambda each: float(each.model.variance)) for pair in pairs]
 
 

@@ -75,10 +75,6 @@ class ExtendedModel:
             first += term.size
         return places
 
-    def without_terms(self) -> "ExtendedModel":
-        """The nominal part alone."""
-        return replace(self, terms=())
-
     def slope_amplitudes(self, joint: int) -> tuple[list[int], Array]:
         """Places of a joint's own estimated constants among all parameters, and the coefficients beside them, (k,)."""
         places, amplitudes = [], []

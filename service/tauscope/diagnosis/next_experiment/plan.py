@@ -7,7 +7,7 @@ import numpy as np
 
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
 from tauscope.diagnosis.findings.verdict import OPEN
-from tauscope.diagnosis.model.extended import ExtendedModel
+from tauscope.diagnosis.model.extended import ExtendedModel, with_terms
 from tauscope.diagnosis.next_experiment.bank import KINDS, Bank, Primitive
 from tauscope.diagnosis.next_experiment.separation import equations, log_variances, played, separations
 from tauscope.errors import ExcitationError
@@ -53,11 +53,11 @@ def plan_experiment(diagnosis: Diagnosis, progress: Callable[[str], None] = lamb
     progress("plan the next experiment")
     judge = _judge(diagnosis)
     bank = Bank(diagnosis.identification, np.random.default_rng(0))
-    nominal = diagnosis.selection.fit.model.without_terms()
+    nominal = with_terms(diagnosis.selection.fit.model, ())
 
     def judged(primitive: Primitive) -> _Judged:
-        motion = played(primitive.trajectory, diagnosis.fitter.observations, nominal, diagnosis.cutoff_hz)
-        added = tuple(equations(each.model, motion.fitter, each.others, each.absent) for each in judge.tasks)
+        rows = played(primitive.trajectory, diagnosis.fitter.observations, nominal, diagnosis.cutoff_hz)
+        added = tuple(equations(each.model, rows, each.others, each.absent) for each in judge.tasks)
         return _Judged(primitive, added, judge.value(added))
 
     # What no explanation is known of may be anywhere that the recordings have not been.

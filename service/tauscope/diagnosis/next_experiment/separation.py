@@ -8,7 +8,7 @@ is the noncentrality with which a test between them works: T-optimality (Atkinso
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,15 +25,8 @@ from tauscope.trajectory import Trajectory
 UNKNOWN = 1e-9  # singular values of the scaled columns below this share of the largest tell nothing
 
 
-@dataclass(frozen=True, eq=False)
-class Played:
-    """A motion as the diagnosis would see it, without torque."""
-
-    fitter: Fitter
-
-
-def played(trajectory: Trajectory, observations: Observations, model: ExtendedModel, cutoff_hz: float) -> Played:
-    """Sample a motion as the recordings were, and condition it as they were, in a band [Hz]."""
+def played(trajectory: Trajectory, observations: Observations, model: ExtendedModel, cutoff_hz: float) -> Fitter:
+    """A motion sampled as the recordings were and conditioned as they were, in a band [Hz], without torque."""
     robot, rate = observations.robot, observations.pieces[0].prepared.motion.rate_hz
     samples = trajectory.samples(rate)
     position = _measured(samples.position, [piece.position_noise for piece in observations], rate)
@@ -43,7 +36,7 @@ def played(trajectory: Trajectory, observations: Observations, model: ExtendedMo
     number = len(observations.names)  # later than all that were recorded
     pieces = tuple(replace(piece, prepared=replace(piece.prepared, recording=number)) for piece in rows)
     rows = replace(rows, pieces=pieces).with_noise(observations.noise)
-    return Played(Fitter(rows.with_weightings(weightings_of_motion(rows, model))))
+    return Fitter(rows.with_weightings(weightings_of_motion(rows, model)))
 
 
 def _measured(position: Array, noises: Sequence[PositionNoise], rate_hz: float) -> Array:
