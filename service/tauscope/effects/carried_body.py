@@ -37,7 +37,7 @@ def body_columns(signals: Signals) -> Array:
 
 
 def body_quantities(mass: float, place: Array, covariance: Array) -> Sequence[Quantity]:
-    """Mass and first moment of `place`, (3,), by `covariance`, (4, 4); none that no torque shows."""
+    """Mass and first moment at `place`, (3,), by `covariance`, (4, 4), without components that no torque shows."""
     found = [Quantity("m", mass, float(np.sqrt(max(covariance[0, 0], 0.0))), "kg")]
     for axis, name in enumerate(("ms_x", "ms_y", "ms_z")):
         if covariance[1 + axis, 1 + axis] > 0.0:

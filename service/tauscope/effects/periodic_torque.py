@@ -137,22 +137,12 @@ class _Periodic(Effect):
         amplitude = float(np.hypot(sine, cosine)) or 1e-300
         of_amplitude = np.array([sine, cosine]) / amplitude
         of_phase = np.array([-cosine, sine]) / amplitude**2
-        own = covariance[:2, :2]
+        own, unit = covariance[:2, :2], self.unit(self.coefficients[0].unit, context)
+        errors = [float(np.sqrt(slope @ own @ slope)) for slope in (of_amplitude, of_phase)]
         return (
             Quantity("order", float(shape[0]), float(np.sqrt(max(covariance[2, 2], 0.0))), self.unit("1/{q}", context)),
-            Quantity(
-                "amplitude",
-                amplitude,
-                float(np.sqrt(of_amplitude @ own @ of_amplitude)),
-                self.unit(self.coefficients[0].unit, context),
-            ),
-            Quantity(
-                "phase",
-                float(np.arctan2(cosine, sine)),
-                float(np.sqrt(of_phase @ own @ of_phase)),
-                "rad",
-                period=2.0 * np.pi,
-            ),
+            Quantity("amplitude", amplitude, errors[0], unit),
+            Quantity("phase", float(np.arctan2(cosine, sine)), errors[1], "rad", period=2.0 * np.pi),
         )
 
     def scenario_entries(self, coefficients: Sequence[float], shape: Sequence[float], robot: Robot) -> Sequence[Entry]:

@@ -90,7 +90,7 @@ class EvidenceRows:
     def moments(
         self, model: ExtendedModel, dependence: Sequence[float], *, owned: bool = False
     ) -> tuple[JointMoments, ...]:
-        """Residual and slopes, by joint; the discrepancy is beyond nominal columns, or beyond all that are `owned`."""
+        """Residual and slopes by joint; the discrepancy is beyond the nominal columns, or all where `owned`."""
         return tuple(self._joint_moments(joint, model, own, owned=owned) for joint, own in enumerate(dependence))
 
     def _joint_moments(self, joint: int, model: ExtendedModel, dependence: float, *, owned: bool) -> JointMoments:

@@ -80,7 +80,7 @@ def plan_experiment(diagnosis: Diagnosis, progress: Callable[[str], None] = lamb
 def planned_experiment(
     diagnosis: Diagnosis, progress: Callable[[str], None] = lambda step: None, *, asked: bool = False
 ) -> PlannedExperiment | None:
-    """The next recording, None where nothing is open or possible. Raises ExcitationError if `asked` in vain."""
+    """The recording to make next, if any. Raises ExcitationError if one is `asked` for and the limits allow none."""
     if not asked and not is_wanted(diagnosis):
         return None
     try:

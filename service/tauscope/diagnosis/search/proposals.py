@@ -197,7 +197,7 @@ class Proposer:
     def zoom(
         self, effect: Effect, shape: Array, size: Array, at: Hypothesis, signals: Sequence[Signals]
     ) -> tuple[Array, Array]:
-        """Parameters of `shape`, (k,), in turn, beside `size`, (c,): free ones between neighbours, a window's kind."""
+        """The best `shape`, (k,), with its `size`, (c,), parameter by parameter, between the grid's neighbours."""
         scorer = Scorer(self.rows, at)
 
         def choose(values: Array, place: int) -> int | None:

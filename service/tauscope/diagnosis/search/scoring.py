@@ -66,7 +66,7 @@ class Scorer:
         self._settings = [(scales, at.linear.posterior(scales)) for scales in (at.scales, self._plain)]
 
     def score(self, effect: Effect, shapes: Array, columns: Mapping[int, Array]) -> tuple[Scored, Scored]:
-        """`shapes`, (s, k), of an effect, of white `columns`, (s, c, R_j) by joint, beside the discrepancy and not."""
+        """`shapes`, (s, k), of an effect of white `columns`, (s, c, R_j) by joint, with and without discrepancy."""
         joints = self._at.linear.joints
         crossed = {joint: joints[joint].against(own) for joint, own in columns.items()}
         shares = self._shares(columns)
