@@ -35,7 +35,9 @@ class Exchange:
             self._rivals |= {own: {each.place for each in found.proposals} for own, found in weighed.items()}
             weighed = {own: found.refuse(refused) for own, found in weighed.items()}
             behind = [own for own, found in weighed.items() if found.is_behind]
-            own = max(behind, key=lambda each: weighed[each].lead) if behind else next(iter(stale), None)
+            own: Place | None = next(iter(stale), None)
+            if behind:
+                own = max(behind, key=lambda each: weighed[each].lead)
             if own is None:
                 doubtful = self._find_doubtful(at, weighed)
                 if doubtful is None:
