@@ -17,6 +17,7 @@ from tauscope.effects import Effect
 from tauscope.effects.computation import side_by_side
 
 MOST_EFFECTS = 12  # effects that are added at most
+FIRST = 3  # proposals, first after one step to their parameters, that are compared after more
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +130,8 @@ class Search:
         if self.gates.held_out is None or len(asked) == len(proposals) < 2:
             return asked
         held_out = self.gates.held_out
-        approached = side_by_side(lambda each: self.gates.laboratory.approach(self.gates.add(at, each)), proposals)
+        approach = self.gates.laboratory.approach
+        approached = side_by_side(lambda each: approach(self.gates.add(at, each), 1), proposals)
         nearer = {id(each): found for each, found in zip(proposals, approached, strict=True)}
         for each in proposals:
             if each not in asked and held_out.change(at, nearer[id(each)]).log_odds() > UNASKED:
@@ -140,7 +142,12 @@ class Search:
             found = held_out.change(nearer[id(one)], nearer[id(other)]).log_odds()
             return found + self.gates.log_odds(other) - self.gates.log_odds(one)
 
-        return sorted(asked, key=cmp_to_key(lambda one, other: int(np.sign(compare(one, other)))))
+        order = cmp_to_key(lambda one, other: int(np.sign(compare(one, other))))
+        asked.sort(key=order)
+        first = asked[:FIRST]
+        nearest = side_by_side(lambda each: approach(nearer[id(each)]), first)
+        nearer |= {id(each): found for each, found in zip(first, nearest, strict=True)}
+        return [*sorted(first, key=order), *asked[FIRST:]]
 
     def _drop_superfluous(self, at: Hypothesis) -> Hypothesis:
         """The same without effects that the later ones made superfluous."""
