@@ -136,7 +136,7 @@ def test_an_effect_is_named_where_training_asks_and_held_out_motion_shows_it(tri
 def test_an_effect_is_tried_where_training_asks_for_it_or_held_out_motion_alone(
     training: float, held_out: float, tried: bool
 ) -> None:
-    laboratory: Any = SimpleNamespace(approach=lambda found: found)
+    laboratory: Any = SimpleNamespace(approach=lambda found, *_: found)
     judge: Any = SimpleNamespace(change=lambda before, after: change(held_out))
     proposal: Any = SimpleNamespace(term=NOTHING, log_factor=training)
     assert Search(Asking(NOTHING, laboratory, NOTHING, judge))._rank(holding("at"), [proposal]) == [proposal] * tried

@@ -130,6 +130,15 @@ def test_a_more_probable_rival_takes_the_place_where_held_out_motion_lets_it(ref
         assert found.rivals[0].term.effect.id == "joint_spring"
 
 
+def test_a_rival_that_gains_nothing_at_its_best_is_an_alternative() -> None:
+    odds: dict[Place, float] = {("joint_spring", 0): 20.0, ("cable_force", 0): 60.0}
+    asked = Deciding(GivenOdds(holding(), NOTHING, NOTHING, None, odds=odds, gain=0.0))
+    _, (found,) = asked.run(holding(JointSpring(0)))
+    assert not asked.gone
+    assert found.rivals[0].log_odds == found.log_odds == 20.0
+    assert found.probability == pytest.approx(0.5)
+
+
 def test_the_more_probable_of_two_stays() -> None:
     odds: dict[Place, float] = {("joint_spring", 0): 60.0, ("cable_force", 0): 20.0}
     at, (found,) = deciding(odds).run(holding(JointSpring(0)))

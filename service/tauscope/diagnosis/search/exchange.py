@@ -46,14 +46,18 @@ class Exchange:
             elif own in stale:
                 stale.remove(own)
                 weighed[own] = self._weigh(at, _groups(at.model)[own], self._rivals[own])
-            elif (other := self._try_rival(at, weighed[own])) is None:
-                refused.add(weighed[own].rivals[0].place)
             else:
-                self.gone.add(own)
-                at, new = other, other.model.terms[-1].place
-                groups = _groups(at.model)
-                stale = set(groups) - {new}
-                weighed = {each: weighed[each] for each in stale} | {new: self._weigh(at, groups[new])}
+                other, gained = self._try_rival(at, weighed[own])
+                if other is None:
+                    refused.add(weighed[own].rivals[0].place)
+                elif gained <= 0.0:
+                    weighed[own] = weighed[own].compare_best(gained)
+                else:
+                    self.gone.add(own)
+                    at, new = other, other.model.terms[-1].place
+                    groups = _groups(at.model)
+                    stale = set(groups) - {new}
+                    weighed = {each: weighed[each] for each in stale} | {new: self._weigh(at, groups[new])}
         findings = (each.refuse({own}) for own, each in weighed.items() if each.log_odds > _find_least(at, each))
         return at, tuple(findings)
 
@@ -67,11 +71,14 @@ class Exchange:
         ]
         return min(doubtful, key=lambda own: weighed[own].log_odds, default=None)
 
-    def _try_rival(self, at: Hypothesis, weighed: Weighed) -> Hypothesis | None:
-        """The hypothesis with the best rival in an effect's place, where more probable, also by training alone."""
+    def _try_rival(self, at: Hypothesis, weighed: Weighed) -> tuple[Hypothesis | None, float]:
+        """The hypothesis with the best rival in an effect's place, None where it cannot be, and the log odds it gains.
+
+        It gains none where training alone predicts their joints worse with it.
+        """
         gates = self.gates
         if weighed.rivals[0].place in self.gone:
-            return None
+            return None, 0.0
         rival, own = weighed.rivals[0].term.effect, at.model.terms[weighed.places[0]].effect
         touched = {*rival.touched(len(at.scales)), *own.touched(len(at.scales))}
         proposal = next(each for each in weighed.proposals if each.term.effect is rival)
@@ -79,7 +86,7 @@ class Exchange:
         gained = gates.compare(at, found, touched)
         gained += gates.prior_odds(rival, 0.0) - gates.prior_odds(own, 0.0) - (CATALOGUED if rival is own else 0.0)
         told = 0.0 if gates.held_out is None else gates.held_out.trained_change(at, found).log_odds(sorted(touched))
-        return found if step.is_confirmed and gained > 0.0 and told >= 0.0 else None
+        return found if step.is_confirmed else None, gained if told >= 0.0 else min(gained, 0.0)
 
     def _weigh(self, at: Hypothesis, places: tuple[int, ...], known: Collection[Place] | None = None) -> Weighed:
         """An effect's odds against none and against others in its place: all, or those that are known to compete."""

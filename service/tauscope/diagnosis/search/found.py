@@ -72,6 +72,12 @@ class Weighed:
         """Whether a rival may take its place: it alone has one, and is less probable."""
         return self.lead > 0.0 and len(self.places) == 1
 
+    def compare_best(self, gained: float) -> "Weighed":
+        """The same where the best rival turned out to gain so many log odds, at most none."""
+        best = replace(self.rivals[0], log_odds=self.log_odds + gained)
+        rivals = sorted((best, *self.rivals[1:]), key=lambda each: -each.log_odds)
+        return replace(self, rivals=tuple(rivals))
+
     def refuse(self, rivals: Collection[Place]) -> "Weighed":
         """The same without some rivals."""
         return replace(self, rivals=tuple(each for each in self.rivals if each.place not in rivals))

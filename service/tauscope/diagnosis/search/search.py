@@ -137,17 +137,16 @@ class Search:
             if each not in asked and held_out.change(at, nearer[id(each)]).log_odds() > UNASKED:
                 asked.append(each)
 
-        def compare(one: Proposal, other: Proposal) -> float:
-            """Log odds of the other. What both predict alike says nothing: they are compared with each other."""
+        def compare(one: Proposal, other: Proposal) -> int:
+            """Which is more probable. What both predict alike says nothing: they are compared with each other."""
             found = held_out.change(nearer[id(one)], nearer[id(other)]).log_odds()
-            return found + self.gates.log_odds(other) - self.gates.log_odds(one)
+            return int(np.sign(found + self.gates.log_odds(other) - self.gates.log_odds(one)))
 
-        order = cmp_to_key(lambda one, other: int(np.sign(compare(one, other))))
-        asked.sort(key=order)
+        asked.sort(key=cmp_to_key(compare))
         first = asked[:FIRST]
         nearest = side_by_side(lambda each: approach(nearer[id(each)]), first)
         nearer |= {id(each): found for each, found in zip(first, nearest, strict=True)}
-        return [*sorted(first, key=order), *asked[FIRST:]]
+        return [*sorted(first, key=cmp_to_key(compare)), *asked[FIRST:]]
 
     def _drop_superfluous(self, at: Hypothesis) -> Hypothesis:
         """The same without effects that the later ones made superfluous."""
