@@ -168,7 +168,7 @@ def test_what_takes_the_place_of_a_nominal_effect_is_added_and_what_stands_besid
     asked = deciding(odds, RotorInertia(0))
     at, _ = asked.run(holding(RotorInertia(0)))
     assert asked.gone == {("rotor_inertia", 0)}
-    assert asked.gates.find_added(at) == [0]
+    assert asked.gates.find_added_terms(at) == [0]
 
 
 class Wavering(Deciding):

@@ -50,14 +50,14 @@ class Exchange:
                 other, gained = self._try_rival(at, weighed[own])
                 if other is None:
                     refused.add(weighed[own].rivals[0].place)
-                elif gained <= 0.0:
-                    weighed[own] = weighed[own].compare_best(gained)
-                else:
+                elif gained > 0.0:
                     self.gone.add(own)
                     at, new = other, other.model.terms[-1].place
                     groups = _groups(at.model)
                     stale = set(groups) - {new}
                     weighed = {each: weighed[each] for each in stale} | {new: self._weigh(at, groups[new])}
+                else:
+                    weighed[own] = weighed[own].compare_best(gained)
         findings = (each.refuse({own}) for own, each in weighed.items() if each.log_odds > _find_least(at, each))
         return at, tuple(findings)
 
@@ -83,10 +83,12 @@ class Exchange:
         touched = {*rival.touched(len(at.scales)), *own.touched(len(at.scales))}
         proposal = next(each for each in weighed.proposals if each.term.effect is rival)
         step, found = gates.attempt(weighed.without, proposal)
+        if not step.is_confirmed:
+            return None, 0.0
         gained = gates.compare(at, found, touched)
         gained += gates.prior_odds(rival, 0.0) - gates.prior_odds(own, 0.0) - (CATALOGUED if rival is own else 0.0)
         told = 0.0 if gates.held_out is None else gates.held_out.trained_change(at, found).log_odds(sorted(touched))
-        return found if step.is_confirmed else None, gained if told >= 0.0 else min(gained, 0.0)
+        return found, gained if told >= 0.0 else min(gained, 0.0)
 
     def _weigh(self, at: Hypothesis, places: tuple[int, ...], known: Collection[Place] | None = None) -> Weighed:
         """An effect's odds against none and against others in its place: all, or those that are known to compete."""
@@ -99,7 +101,7 @@ class Exchange:
         effect, shared = at.model.terms[places[0]].effect, set(touched)
         lasts = not isinstance(effect, TimeLocalEffect)
         trained = at.log_evidence - before.log_evidence + gates.prior_odds(effect, unnamed_log_odds(before))
-        log_odds = trained + gates.told(without, at)
+        log_odds = trained + gates.weigh_held_out(without, at)
         own, may_be_added = (effect.id, effect.joint), Wanted(find_places(without), ())
 
         def competes(each: Effect) -> bool:
@@ -118,7 +120,7 @@ class Exchange:
                 odds = log_odds + gates.compare(at, nearer, touched) - CATALOGUED
             else:
                 nearer = laboratory.approach(nearer)
-                odds = log_odds - trained + gates.log_odds(proposal) + gates.told(at, nearer)
+                odds = log_odds - trained + gates.log_odds(proposal) + gates.weigh_held_out(at, nearer)
             rivals.append(Rival(nearer.model.terms[-1], nearer.model, odds))
         rivals.sort(key=lambda each: -each.log_odds)
         return Weighed(places, without, log_odds, tuple(rivals), tuple(proposals))

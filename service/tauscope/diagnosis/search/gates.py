@@ -33,7 +33,7 @@ class Gates:
     proposer: Proposer
     held_out: HeldOut | None
 
-    def find_added(self, at: Hypothesis) -> list[int]:
+    def find_added_terms(self, at: Hypothesis) -> list[int]:
         """Places of the terms that the nominal model has not."""
         known = find_places(self.nominal)
         return [place for place, term in enumerate(at.model.terms) if term.place not in known]
@@ -50,7 +50,7 @@ class Gates:
         passes = isinstance(proposal.term.effect, TimeLocalEffect)
         if passes:
             trained = min(trained, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
-        log_odds = trained + self.told(at, found)
+        log_odds = trained + self.weigh_held_out(at, found)
         confirmed = log_odds > (UNASKED if passes else NAMED) and stands(found.model)
         asked = trained > NAMED
         if self.held_out is not None:  # what training does not ask for may cost no joint anything
@@ -63,7 +63,7 @@ class Gates:
     def _drop_impossible(self, at: Hypothesis) -> tuple[Hypothesis, list[Effect]]:
         """The same without what was found before its last effect and cannot be beside it, and what that is."""
         lost: list[Effect] = []
-        while broken := [place for place in self.find_added(at)[:-1] if not _is_possible(at.model, place)]:
+        while broken := [place for place in self.find_added_terms(at)[:-1] if not _is_possible(at.model, place)]:
             lost.append(at.model.terms[broken[0]].effect)
             at = self.settle_without(at, broken[0])
         return at, lost
@@ -133,14 +133,14 @@ class Gates:
         turned = replace(term, shape=outside, coefficients=-term.coefficients)
         other = self.laboratory.with_term(self.laboratory.without_term(at, last), turned, at.sizes[last])
         other = self.laboratory.settle(other, touched)
-        return other if self.told(at, other) > 0.0 else at
+        return other if self.weigh_held_out(at, other) > 0.0 else at
 
     def compare(self, at: Hypothesis, found: Hypothesis, touched: Collection[int]) -> float:
         """Log Bayes factor of a second hypothesis; what both predict alike of held-out motion says nothing."""
         gained = self.laboratory.under(found, at.dependence, touched).log_evidence - at.log_evidence
-        return gained + self.told(at, found)
+        return gained + self.weigh_held_out(at, found)
 
-    def told(self, before: Hypothesis, after: Hypothesis) -> float:
+    def weigh_held_out(self, before: Hypothesis, after: Hypothesis) -> float:
         """Log odds that held-out motion adds to the second of two hypotheses."""
         return 0.0 if self.held_out is None else self.held_out.change(before, after).log_odds()
 

@@ -45,8 +45,8 @@ class Search:
                 at = exchanged
                 break
             at = self._drop_superfluous(exchanged)
-            _forgive(refused, _find_changed(grown, at))
-            refused |= dict.fromkeys(exchange.gone, frozenset())
+            _forgive(refused, _find_changed_joints(grown, at))
+            refused |= dict.fromkeys(exchange.gone - find_places(at), frozenset())
         return Found(self.gates.nominal, at, tuple(steps), weighed)
 
     def _grow(self, at: Hypothesis, refused: dict[Place, frozenset[int]]) -> tuple[Hypothesis, list[Step]]:
@@ -56,7 +56,7 @@ class Search:
         nothing helps any more.
         """
         steps, looks, is_anew = list[Step](), Looks(), True
-        while len(self.gates.find_added(at)) < MOST_EFFECTS:
+        while len(self.gates.find_added_terms(at)) < MOST_EFFECTS:
             proposals = self.gates.proposer.propose(at, Wanted(find_places(at), refused), looks=looks)
             tried, found = self._best(at, proposals, looks)
             steps += tried
@@ -67,7 +67,7 @@ class Search:
                 looks, is_anew = Looks(), True
                 continue
             before, at, is_anew = at, self._drop_superfluous(found), False
-            changed = _find_changed(before, at)
+            changed = _find_changed_joints(before, at)
             looks.forget(changed, len(at.scales))
             _forgive(refused, changed)
             refused |= dict.fromkeys(find_places(found) - find_places(at), frozenset())
@@ -77,7 +77,7 @@ class Search:
         """Farther forms in the place of effects that they refine, where they are more probable."""
         for effect in self.farther:
             terms = at.model.terms
-            own = (place for place in self.gates.find_added(at) if terms[place].effect.joint == effect.joint)
+            own = (place for place in self.gates.find_added_terms(at) if terms[place].effect.joint == effect.joint)
             refined = next((place for place in own if terms[place].effect.id in effect.refines), None)
             if refined is not None:
                 at = self._refine_by(effect, refined, at)
@@ -95,7 +95,7 @@ class Search:
 
     def _drop_harmful(self, at: Hypothesis) -> Hypothesis:
         """The same without the effects at whose cost joints are predicted worse than by the nominal model."""
-        while self.gates.held_out is not None and (added := self.gates.find_added(at)):
+        while self.gates.held_out is not None and (added := self.gates.find_added_terms(at)):
             if self.gates.held_out.trained_change(self.gates.nominal, at).harm <= 0.0:
                 break
             others = [self.gates.settle_without(at, place) for place in added]
@@ -151,7 +151,7 @@ class Search:
     def _drop_superfluous(self, at: Hypothesis) -> Hypothesis:
         """The same without effects that the later ones made superfluous."""
         while True:
-            places = [place for place in self.gates.find_added(at) if place < len(at.model.terms) - 1]
+            places = [place for place in self.gates.find_added_terms(at) if place < len(at.model.terms) - 1]
             gains = side_by_side(lambda place, at=at: self._weigh_absence(at, place), places)
             pairs = sorted(zip(gains, places, strict=True), reverse=True)
             others = (self._leave_out(at, place, gain) for gain, place in pairs if gain > CATALOGUED)
@@ -163,7 +163,7 @@ class Search:
     def _leave_out(self, at: Hypothesis, place: int, gain: float) -> Hypothesis | None:
         """The hypothesis without an effect; None where held-out motion asks for it."""
         without = self.gates.settle_without(at, place)
-        return without if gain + self.gates.told(at, without) > CATALOGUED else None
+        return without if gain + self.gates.weigh_held_out(at, without) > CATALOGUED else None
 
     def _weigh_absence(self, at: Hypothesis, place: int) -> float:
         """Log posterior odds that an effect is not there."""
@@ -181,7 +181,7 @@ def _find_joints(step: Step) -> frozenset[int]:
     return frozenset(step.effect.touched(step.after.structure.robot.joint_count))
 
 
-def _find_changed(before: Hypothesis, after: Hypothesis) -> set[int]:
+def _find_changed_joints(before: Hypothesis, after: Hypothesis) -> set[int]:
     """Joints at which two hypotheses have other effects."""
     one, other = (
         Counter((term.place, term.effect.touched(len(each.scales))) for term in each.model.terms)
