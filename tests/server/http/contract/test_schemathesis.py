@@ -6,6 +6,7 @@ Half of what is handed in is an example that works, so that the operations on wh
 import json
 import zlib
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 from fastapi import FastAPI
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
+from hypothesis.errors import FlakyStrategyDefinition
 
 from server.http.contract.documented import require_documented
 from server.http.contract.running import running
@@ -114,6 +116,7 @@ def test_every_operation_answers_as_documented(name: str, address: str) -> None:
 def test_what_was_made_is_used_removed_and_used_again(address: str) -> None:
     machine = load(address).as_state_machine()
     statuses: list[tuple[str, int]] = []
+    wrong: list[Exception] = []
 
     class Machine(machine):
         def before_call(self, case: Any) -> None:
@@ -126,7 +129,11 @@ def test_what_was_made_is_used_removed_and_used_again(address: str) -> None:
             statuses.append((f"{case.method} {case.path}", response.status_code))
 
         def validate_response(self, response: Any, case: Any, **kwargs: Any) -> None:
-            check(case, response)
+            try:
+                check(case, response)
+            except Exception as error:
+                wrong.append(error)
+                raise
 
     one = settings(
         max_examples=1,
@@ -136,12 +143,16 @@ def test_what_was_made_is_used_removed_and_used_again(address: str) -> None:
         phases=[Phase.generate],
         suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large],
     )
-    # One example a run: the service remembers, so that no example can be played twice to the same end.
+    # One example a run: the service remembers, so that no example can be played twice to the same end. Hypothesis plays
+    # on where it rejects the first, and calls what differs then inconsistent; a wrong answer is kept whatever it says.
     # What a sequence reaches depends on how fast the service's own work ends: a busy machine needs more of them.
     reached: set[str] = set()
     for number in range(4 * SCENARIOS):
         if number >= SCENARIOS and len(reached) >= 5:
             break
-        seed(number)(Machine).run(settings=one)
+        with suppress(FlakyStrategyDefinition):
+            seed(number)(Machine).run(settings=one)
+        if wrong:
+            raise wrong[0]
         reached = {operation for operation, status in statuses if "{identifier}" in operation and status < 300}
     assert len(reached) >= 5, "hardly anything that was made was reached"
