@@ -27,6 +27,7 @@ def _model(folder: Path, path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_emps_under_its_own_controller(tmp_path: Path) -> None:
     """kp = 160.18 1/s and kv = 243.45 V/(m/s), times 35.15 N/V (Janot et al. 2019)."""
     folder = SHARED_DATA / "emps"

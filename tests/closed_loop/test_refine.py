@@ -63,6 +63,7 @@ def _record(model: ExportModel, by_load: LoadFriction | None, seconds: float, se
     )
 
 
+@pytest.mark.slow
 def test_friction_by_load_is_found_and_wins() -> None:
     robot = _robot()
     by_load = LoadFriction(np.array([DRIVING]), np.array([BRAKING]))

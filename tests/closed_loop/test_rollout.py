@@ -65,7 +65,7 @@ def _record(model: ExportModel, seconds: float = 4.0, actuator: ActuatorKind = A
     return Recording.from_arrays("real", time, positions, torques, velocity=velocities, reference=command)
 
 
-@pytest.mark.parametrize("actuator", [ActuatorKind.MOTOR, ActuatorKind.POSITION])
+@pytest.mark.parametrize("actuator", [ActuatorKind.MOTOR, pytest.param(ActuatorKind.POSITION, marks=pytest.mark.slow)])
 def test_a_pasted_mjcf_gives_the_same_motion(actuator: ActuatorKind) -> None:
     """Within 1e-6 rad of the rollout, in plain MuJoCo with 1 ms and implicitfast."""
     robot = _robot()
@@ -119,6 +119,7 @@ def test_a_resting_joint_rests() -> None:
     assert np.abs(data.qpos).max() < 1e-3
 
 
+@pytest.mark.slow
 def test_constant_torque_counts() -> None:
     robot = _robot()
     quiet, pulled = _model(robot), _model(robot, offset=0.4)
@@ -126,6 +127,7 @@ def test_constant_torque_counts() -> None:
     assert found.document.summary[-1].rms[0] > 5e-3
 
 
+@pytest.mark.slow
 def test_recorded_torque_drives_where_no_loop_is_stated() -> None:
     robot = _robot()
     model = _model(robot)
@@ -138,6 +140,7 @@ def test_recorded_torque_drives_where_no_loop_is_stated() -> None:
     assert max(entry.rms) < 5e-3
 
 
+@pytest.mark.slow
 def test_a_delay_that_nothing_states_is_estimated() -> None:
     robot = _robot()
     real = _record(_model(robot), 4.0)

@@ -59,6 +59,7 @@ def check(found: DiagnosisDocument) -> None:
     assert all(a < b for a, b in zip(found.fit.train.rms_after, found.fit.train.rms_before, strict=True))
 
 
+@pytest.mark.slow
 def test_the_models_wrong_value_is_a_difference_and_what_it_lacks_a_finding() -> None:
     found = document(against_model(real()))
     assert found.against == "model"

@@ -37,6 +37,7 @@ def test_compliance_and_play_are_measured_within_their_errors(step: float) -> No
         assert abs(found.compliance - true) < 2.0 * found.compliance_std < 0.2 * true
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [0.0, FOURTEEN_BIT], ids=["fine", "14 bit"])
 def test_rigid_joints_show_neither_whatever_mounting_and_wiring_add(step: float) -> None:
     for seed in range(5):
@@ -113,6 +114,7 @@ def diagnosed(effects: Sequence[str] | None, **deflection: tuple[float, ...]) ->
         return diagnose(paper_robot(), train, held_out)
 
 
+@pytest.mark.slow
 @SEARCHED
 def test_a_diagnosis_names_what_the_encoders_show(effects: Sequence[str] | None) -> None:
     diagnosis = diagnosed(effects, compliance=(0.0, 3e-4, 0.0), play=PLAY)

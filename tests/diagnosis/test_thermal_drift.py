@@ -58,6 +58,7 @@ def test_whole_degrees_are_smoothed() -> None:
 SEARCHED = pytest.mark.parametrize("effects", few_or_all("friction_drift", "joint_spring"))
 
 
+@pytest.mark.slow
 @SEARCHED
 def test_viscous_friction_that_falls_as_a_joint_warms_up_is_named_with_its_temperature(
     effects: Sequence[str] | None,

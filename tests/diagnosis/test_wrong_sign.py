@@ -63,7 +63,7 @@ def turned(joints: Sequence[int], seeds: tuple[int, ...], rng: np.random.Generat
 
 
 @pytest.mark.parametrize("effects", few_or_all("joint_spring", "payload"))
-@pytest.mark.parametrize(("joints", "place"), [((1,), 1), (ALL, None)])
+@pytest.mark.parametrize(("joints", "place"), [((1,), 1), pytest.param(ALL, None, marks=pytest.mark.slow)])
 def test_recordings_with_reversed_torque_show_that_and_nothing_else(
     joints: Sequence[int], place: int | None, effects: Sequence[str] | None
 ) -> None:

@@ -51,6 +51,7 @@ LIMITS = {
 }
 
 
+@pytest.mark.slow
 @settings(max_examples=3, suppress_health_check=[HealthCheck.too_slow])
 @given(**LIMITS)
 def test_random_limits_hold_at_every_instant(**drawn: Any) -> None:
@@ -86,6 +87,7 @@ def plain() -> ExcitationDesign:
     return design_excitation(limited_paper_arm(), QUICK)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_motion() -> None:
     first, second = plain(), design_excitation(limited_paper_arm(), QUICK)
     assert trajectory_json(first.trajectory) == trajectory_json(second.trajectory)

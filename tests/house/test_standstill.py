@@ -65,6 +65,7 @@ def test_a_failure_counts_unless_the_machine_stood_still(
     assert outcomes(pytester, monkeypatch, test) == outcome
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("microseconds", [300_000, 0])
 def test_a_failure_is_expected_of_a_machine_that_is_too_slow(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, microseconds: int
@@ -82,6 +83,7 @@ def test_a_machine_whose_time_is_taken_is_given_another_run(
     assert told == {"passed": 1, "rerun": 1}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("microseconds", "taken_s", "outcome"), [
     (0, (60.0, 60.0), {"xfailed": 1, "rerun": 1}),
     (0, (60.0, 0.0), {"failed": 1, "rerun": 1}),

@@ -128,7 +128,7 @@ def test_a_stribeck_term_is_found_with_delta_unknown(runs: int) -> None:
         assert np.abs(z_scores(result, arm.robot)).max() < 4.5
 
 
-@pytest.mark.parametrize("k_v", [60.0, 500.0, 5000.0])
+@pytest.mark.parametrize("k_v", [60.0, *(pytest.param(k_v, marks=pytest.mark.slow) for k_v in (500.0, 5000.0))])
 @runs(12, 100)
 def test_no_stribeck_term_is_invented(k_v: float, runs: int) -> None:
     arm = simulate(with_shapes(paper_robot(), k_v, 1.0), seed=2, friction=WITHOUT_STRIBECK)

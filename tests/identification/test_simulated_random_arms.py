@@ -75,6 +75,7 @@ def check_against_mujoco(seed: int, joint_count: int, folder: Path) -> None:
     assert np.abs(errors).max() < 4.0, dict(zip(base.names, errors.round(2), strict=True))
 
 
-@pytest.mark.parametrize("joint_count", [2, *(pytest.param(count, marks=pytest.mark.slow) for count in range(3, 8))])
+@pytest.mark.slow
+@pytest.mark.parametrize("joint_count", range(2, 8))
 def test_a_random_arm_has_mujocos_inertias(tmp_path: Path, joint_count: int) -> None:
     check_against_mujoco(100 + joint_count, joint_count, tmp_path)

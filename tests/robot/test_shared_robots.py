@@ -73,6 +73,7 @@ def test_motion_is_designed(name: str) -> None:
     assert design.design.trajectory.joints
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effects", few_or_all("joint_spring", "payload"))
 def test_exact_model_with_a_gripper_is_consistent(effects: Sequence[str] | None) -> None:
     folder = ROBOTS / "63-gripper-beside"

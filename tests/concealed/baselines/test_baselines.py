@@ -57,6 +57,7 @@ def test_the_criterion_finds_what_the_nominal_model_half_hides() -> None:
     assert told["correlation"][0][0] == "joint_spring@joint1"
 
 
+@pytest.mark.slow
 def test_on_an_arm_the_criterion_names_a_cogging_that_stands_out() -> None:
     """A motion that is followed exactly, by our own inverse dynamics: no simulation is needed to see that all fits."""
     robot, rng = arm_named("paper"), np.random.default_rng(8)

@@ -18,6 +18,7 @@ LOAD = {"effect": "payload_change", "mass": 1.5, "offset": [0.05, 0.0, 0.1], "st
 OTHERS = [pytest.param(each, marks=pytest.mark.slow) for each in ({**PUSH, "profile": "rectangular"}, LOAD)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("entry", [{**PUSH, "profile": "half_sine"}, *OTHERS])
 def test_it_is_what_the_simulated_drives_need_more(
     entry: Entry, tmp_path: Any, monkeypatch: pytest.MonkeyPatch

@@ -40,6 +40,7 @@ def test_at_a_bound_it_looks_no_further() -> None:
     assert looks == [1.0, 5.0]
 
 
+@pytest.mark.slow
 def test_every_effect_is_sized_without_a_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
     """Sound passages are made once; an effect is a law along them."""
     sight = short_sight()

@@ -195,6 +195,7 @@ def test_what_was_mistaken_stands_off_the_diagonal(outcomes: list[dict[str, Any]
     assert table.sum() == 130
 
 
+@pytest.mark.slow
 def test_the_page_has_every_figure_every_failure_and_a_reason(
     outcomes: list[dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -224,6 +225,7 @@ def test_a_set_that_is_not_done_says_so(outcomes: list[dict[str, Any]], tmp_path
     assert "the outcomes of 3 trials, **the first of a set of 400**" in text
 
 
+@pytest.mark.slow
 def test_the_same_outcomes_give_the_same_bytes(outcomes: list[dict[str, Any]], tmp_path: Path) -> None:
     first, second = (write_page(outcomes[-3:], tmp_path / name / "proof.md", "x") for name in ("a", "b"))
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]

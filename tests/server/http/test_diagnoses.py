@@ -100,6 +100,7 @@ def test_a_saved_model_and_what_is_compared_with_belong_together(client: TestCli
     assert refused["problem"]["detail"].startswith("model.json: ")
 
 
+@pytest.mark.slow
 def test_against_the_model_of_the_robot_file(client: TestClient, files: Files) -> None:
     with only_effects(["payload"]):
         accepted = client.post(DIAGNOSES, files=files, data=form({"options": {"against": "model"}}))

@@ -65,6 +65,7 @@ def test_payload_away_from_the_tool_point(planar: Any, planar_trial: Any, agrees
     agrees(planar.robot, [effect], planar_trial, rates, TOLERANCE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("start", "end"), [(0.3333, None), (0.0, 0.41), (0.2, 0.5)])
 def test_payload_change(start: float, end: float | None, planar: Any, planar_trial: Any, agrees: Agree) -> None:
     heavier = replace(planar, masses=(2.0, 1.8))
@@ -135,6 +136,7 @@ def test_link_turned_about_its_axis_shifts_the_joint(planar: Any, planar_trial: 
     np.testing.assert_allclose(turned["link_position"] + [0.0, 0.1], shifted["link_position"], rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("of", ["sum", "difference"])
 def test_coupled_friction(of: str, planar: Any, planar_trial: Any, agrees: Agree) -> None:
     sign = 1.0 if of == "sum" else -1.0

@@ -64,6 +64,7 @@ LAWS: dict[str, tuple[Any, Callable[[float, float], float]]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LAWS)
 def test_the_pendulum_follows_the_law(name: str, follows: Callable[..., Any]) -> None:
     effect, torque = LAWS[name]

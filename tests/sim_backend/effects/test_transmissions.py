@@ -78,6 +78,7 @@ QUICK = ("friction behind a rotor", "friction and ripple")
 EVERY_CASE = [pytest.param(each, marks=() if each in QUICK else pytest.mark.slow) for each in CASES]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY_CASE)
 def test_what_the_load_costs(name: str, planar: Any, planar_trial: Any, agrees: Agree) -> None:
     effects, rates = CASES[name]
@@ -116,6 +117,7 @@ def teeth(twist: float, rate: float, gap: float, stiffness: float, damping: floa
     return float(np.sign(twist) * stiffness * overlap * max(0.0, 1.0 + damping * np.sign(twist) * rate))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mu", [0.0, 0.15])
 def test_an_elastic_joint_is_two_masses(mu: float, pendulum: Any, pendulum_trial: Any) -> None:
     effects: list[Any] = [JointElasticity(joint=1, stiffness=800.0, damping=0.5, rotor_inertia=0.1)]

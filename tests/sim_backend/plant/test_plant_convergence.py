@@ -52,6 +52,7 @@ def end(robot: Robot, effects: Sequence[Any], step_s: float) -> Array:
 QUICK = ("friction", "bristles")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in CASES]
 )

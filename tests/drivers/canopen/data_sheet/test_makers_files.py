@@ -45,7 +45,7 @@ def test_what_cannot_be_used_is_refused_with_all_reasons(name: str) -> None:
         assert reason in str(refusal.value)
 
 
-@pytest.mark.parametrize("policy", [StopPolicy.HOLD, StopPolicy.TORQUE_OFF])
+@pytest.mark.parametrize("policy", [StopPolicy.HOLD, pytest.param(StopPolicy.TORQUE_OFF, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ACCEPTED)
 def test_an_accepted_drive_moves_and_stops(name: str, policy: StopPolicy) -> None:
     """Its emulation has the objects, the access rights and the mappings of the file, and no others."""
@@ -71,6 +71,7 @@ def test_an_accepted_drive_moves_and_stops(name: str, policy: StopPolicy) -> Non
         arm.disconnect()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ACCEPTED)
 def test_a_held_arm_is_enabled_again_without_letting_go(name: str) -> None:
     with EmulatedBus([Path(FOLDER / name)]) as bus:
