@@ -20,6 +20,8 @@ SERVICE = ("tests/server", "tests/reliability", "tests/browser", "tests/client")
 QUICK_PROOF = (
     "tests/docs/test_readme.py",
     "tests/concealed/test_proof.py",
+    "tests/concealed/baselines",
+    "tests/concealed/publishing",
     "tests/concealed/test_reduced_bench.py",
     "tests/concealed/real",
 )

@@ -165,6 +165,7 @@ def test_the_process_ends_as_main_says(files: SimulatedFiles, tmp_path: Path) ->
         assert ("empty.csv" in ended.stderr) == (status == 1)
 
 
+@pytest.mark.slow
 def test_a_terminal_that_knows_ascii_only_is_no_bug(files: SimulatedFiles) -> None:
     ascii_only = os.environ | {"PYTHONIOENCODING": "ascii"}
     command = [*PROGRAM, "recording", "check", str(files.train[0])]
@@ -173,6 +174,7 @@ def test_a_terminal_that_knows_ascii_only_is_no_bug(files: SimulatedFiles) -> No
     assert "\\u2026" in ended.stdout
 
 
+@pytest.mark.slow
 def test_a_reader_that_goes_away_is_no_bug(files: SimulatedFiles) -> None:
     command = [*PROGRAM, "robot", "check", str(files.robot)]
     reading, writing = os.pipe()

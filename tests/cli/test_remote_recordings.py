@@ -131,7 +131,7 @@ def test_an_object_is_read_as_a_file_is(bucket: str, folder: Path, name: str) ->
 
 
 @pytest.mark.parametrize("name", [name for name in FILES if name != "bag"])
-@pytest.mark.parametrize("handler", [Ranges, WholeFiles])
+@pytest.mark.parametrize("handler", [Ranges, pytest.param(WholeFiles, marks=pytest.mark.slow)])
 def test_a_web_page_is_read_as_a_file_is(serve: Callable[[type], str], folder: Path, handler: type, name: str) -> None:
     Ranges.served = []
     recording = read_recording(f"{serve(handler)}/{name}")

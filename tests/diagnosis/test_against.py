@@ -67,6 +67,7 @@ def test_the_models_wrong_value_is_a_difference_and_what_it_lacks_a_finding() ->
     check(found)
 
 
+@pytest.mark.slow
 def test_the_same_against_recordings_of_that_simulation() -> None:
     found = document(against_simulation(real(), simulated(mistaken()), Options()))
     assert found.against == "simulation"

@@ -94,6 +94,7 @@ def test_one_wrong_body_is_one_explanation(change: Change, title: str, link: int
     assert f"{title} of link {link}" in found
 
 
+@pytest.mark.slow
 def test_a_right_arm_needs_none() -> None:
     assert [explanations({}, seed) for seed in range(20)] == [()] * 20
 

@@ -132,6 +132,7 @@ def test_a_diagnosis_names_what_the_encoders_show(effects: Sequence[str] | None)
     assert [type(term.effect) for term in again] == [type(term.effect) for term in terms]
 
 
+@pytest.mark.slow
 @SEARCHED
 def test_a_rigid_joint_is_never_called_elastic(effects: Sequence[str] | None) -> None:
     """The torque of a spring that the motors do not show is none of a transmission."""

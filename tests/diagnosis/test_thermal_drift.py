@@ -87,6 +87,7 @@ def test_viscous_friction_that_falls_as_a_joint_warms_up_is_named_with_its_tempe
     assert term.effect.reference_c == values["T_0"].value
 
 
+@pytest.mark.slow
 @SEARCHED
 def test_a_temperature_that_friction_does_not_follow_is_no_finding(effects: Sequence[str] | None) -> None:
     rng = np.random.default_rng(7)

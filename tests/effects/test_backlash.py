@@ -78,6 +78,7 @@ def test_gaps_of_any_size(gap: float) -> None:
     np.testing.assert_allclose(np.median(np.abs(place - expected)), 0.0, atol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", [0.8, 8.0, 80.0])
 def test_on_springy_teeth_it_is_where_a_solver_with_small_steps_has_it(loss: float) -> None:
     gap, stiffness = 6e-3, 900.0

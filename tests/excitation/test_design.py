@@ -105,6 +105,7 @@ def test_progress_grows_to_its_end() -> None:
     assert bests[-1] < bests[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("criterion", list(Criterion))
 def test_every_criterion_gets_better_where_it_is_asked_for(criterion: Criterion) -> None:
     design = (
@@ -136,6 +137,7 @@ def test_noise_and_scaling_change_the_motion() -> None:
         design_excitation(robot, replace(QUICK, noise_std=np.array([1.0, 0.0, 1.0])))
 
 
+@pytest.mark.slow
 def test_floor_and_box_are_kept_clear() -> None:
     robot = limited_paper_arm()
     workspace = Workspace(0.1, (Box(np.array([0.3, -2.0, 0.0]), np.array([1.5, -0.2, 2.0])),))
@@ -153,6 +155,7 @@ def test_floor_and_box_are_kept_clear() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_tight_torque_limit_is_kept() -> None:
     robot = limited_paper_arm(torque=11.0)
     design = design_excitation(robot, QUICK)

@@ -63,6 +63,7 @@ def test_a_hidden_law_is_predicted_near_its_true_share(law: Law) -> None:
     assert 0.95 * NOISE < found.black_box < found.explained == found.plain
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small")
 @pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, 50), marks=pytest.mark.proof)], ids=len)
 def test_noise_is_never_predicted(seeds: range) -> None:
@@ -82,6 +83,7 @@ def test_held_out_torque_is_not_learned() -> None:
     assert found.share < 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small")
 def test_a_law_that_changes_with_the_recording_is_no_gain() -> None:
     rng = np.random.default_rng(4)

@@ -142,6 +142,7 @@ def test_no_stribeck_term_is_invented(k_v: float, runs: int) -> None:
         assert [entry.delta for entry in document(result).friction] == [None, None, None]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [1e-3, 1e-5])
 @runs(3, 10)
 def test_a_k_v_between_grid_points_is_not_taken_for_stribeck(noise: float, runs: int) -> None:
@@ -190,6 +191,7 @@ def test_an_ideal_step_does_not_let_the_slope_run_away(noise: float, runs: int) 
             assert abs(result.free_parameters[column] - level[joint]) <= 4.5 * std + 0.02 * level[joint]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", [0.2, 0.5])
 @pytest.mark.parametrize("noise", [1.0, 3.0])
 def test_viscous_friction_that_bends_is_not_taken_for_a_gentle_step(level: float, noise: float) -> None:

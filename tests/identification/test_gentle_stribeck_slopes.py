@@ -17,6 +17,7 @@ def arm(request: pytest.FixtureRequest) -> SimulatedArm:
     return simulate(with_shapes(paper_robot(), 60.0, request.param), seed=3, period_s=20.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("runs", [6, pytest.param(60, marks=pytest.mark.slow)])
 def test_a_gentle_slope_is_found_within_its_error(arm: SimulatedArm, runs: int) -> None:
     delta = arm.robot.joints[0].friction_shape.delta
@@ -38,6 +39,7 @@ def test_a_gentle_slope_is_near_the_truth() -> None:
         assert [shape.delta for shape in result.shapes] == pytest.approx([3.0] * 3, rel=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("steepness", "coefficient"), [(1.0, -0.5), (1.0, -1.0), (0.6, -2.0)])
 def test_a_slope_gentler_than_every_candidate_is_found(steepness: float, coefficient: float) -> None:
     """δ times the rms speed is less than the grid's 1.6; without the term K_v = 200 comes out up to 290."""

@@ -165,7 +165,8 @@ def test_several_recordings_are_one_set_of_equations(arm: SimulatedArm, result) 
     assert np.abs(z_scores(both, arm.robot)).max() < 4.5
 
 
-@pytest.mark.parametrize("cutoff_hz", [pytest.param("auto", marks=pytest.mark.slow), 8.0])
+@pytest.mark.slow
+@pytest.mark.parametrize("cutoff_hz", ["auto", 8.0])
 @pytest.mark.parametrize("periods", [True, False])
 def test_equations_that_do_not_fit_into_memory_are_made_again(
     arm: SimulatedArm, cutoff_hz, periods: bool, monkeypatch: pytest.MonkeyPatch

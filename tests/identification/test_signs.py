@@ -15,8 +15,8 @@ from tauscope.robot import LinkInertia, Model, Robot, read_robot
 
 SETS = (
     "emps",
-    "double-pendulum",
     "bam-xl330",
+    pytest.param("double-pendulum", marks=pytest.mark.slow),
     *(pytest.param(name, marks=pytest.mark.proof) for name in ("franka-panda", "staubli-tx40")),
 )
 
@@ -38,6 +38,7 @@ def assert_named(robot: Robot, recordings: list[Recording], joints: tuple[int, .
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [11, pytest.param(4, marks=pytest.mark.proof)], ids=["three joints", "seven joints"])
 def test_each_joint_of_a_simulated_arm_and_all(seed: int, tmp_path: Path) -> None:
     robot, train, _ = poor_arm(seed, "short", tmp_path)

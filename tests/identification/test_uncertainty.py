@@ -97,6 +97,7 @@ def test_autocorrelated_noise_widens_the_standard_errors(slow_arm: SimulatedArm,
     assert_unbiased(results, slow_arm)
 
 
+@pytest.mark.slow
 @runs(6, 40)
 def test_autocorrelated_noise_with_samples_missed(slow_arm: SimulatedArm, runs: int) -> None:
     """A sample in twenty: pairs of neighbours are fewer, not less alike."""
@@ -119,6 +120,7 @@ def test_autocorrelated_noise_in_averaged_periods(seed: int, runs: int) -> None:
     assert_unbiased(results, arm)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("coefficient", [-0.5, 0.5])
 @runs(6, 30)
 def test_other_colours_of_noise(slow_arm: SimulatedArm, coefficient: float, runs: int) -> None:
@@ -128,6 +130,7 @@ def test_other_colours_of_noise(slow_arm: SimulatedArm, coefficient: float, runs
     assert 0.85 <= rms(scores(runs_of(slow_arm, runs, draw), slow_arm)) <= 1.15
 
 
+@pytest.mark.slow
 @runs(8, 30)
 def test_joints_of_very_different_noise(slow_arm: SimulatedArm, runs: int) -> None:
     std = np.array([2.0, 0.02, 0.2])
@@ -143,6 +146,7 @@ def test_joints_of_very_different_noise(slow_arm: SimulatedArm, runs: int) -> No
     assert standard_errors(ls)[mass] > 3.0 * standard_errors(results[0])[mass]
 
 
+@pytest.mark.slow
 def test_averaging_periods_changes_no_answer(slow_arm: SimulatedArm) -> None:
     """Without encoder noise a mean of periods holds the same information as the periods one by one."""
     for seed in range(5):
@@ -196,6 +200,7 @@ def test_encoder_noise_neither_biases_nor_fools(fast_arm: SimulatedArm, periods:
     np.testing.assert_allclose(found, 2e-5, rtol=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 4])
 @runs(4, 60)
 def test_encoder_noise_does_not_bias_where_torque_noise_is_small(seed: int, runs: int) -> None:
@@ -208,6 +213,7 @@ def test_encoder_noise_does_not_bias_where_torque_noise_is_small(seed: int, runs
     assert rms(scores(runs_of(arm, runs, draw), arm)) <= 1.2
 
 
+@pytest.mark.slow
 def test_the_residual_tells_the_torque_noise_beside_encoder_noise() -> None:
     arm = simulate(paper_robot(), seed=4, rate_hz=200.0, periods=5)
     results = runs_of(

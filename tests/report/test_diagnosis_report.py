@@ -116,6 +116,7 @@ def test_hashes_and_the_command_are_there(reading: Reading) -> None:
     assert "tauscope run ROBOT.yaml --trajectory next.json" in text
 
 
+@pytest.mark.slow
 def test_the_page_is_the_same_on_every_run(
     found: Diagnosis, told: DiagnosisDocument, planned: PlannedExperiment, page: str
 ) -> None:

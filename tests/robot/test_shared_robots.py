@@ -66,7 +66,13 @@ def test_every_urdf_is_a_robot_by_itself(path: Path) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["01-rounding-inertia/arm.yaml", "02-inertia-without-triangle.urdf", "64-mimic/pal.yaml", "64-mimic/pal.urdf"],
+    [
+        "01-rounding-inertia/arm.yaml",
+        *(
+            pytest.param(name, marks=pytest.mark.slow)
+            for name in ("02-inertia-without-triangle.urdf", "64-mimic/pal.yaml", "64-mimic/pal.urdf")
+        ),
+    ],
 )
 def test_motion_is_designed(name: str) -> None:
     design = tauscope.design_excitation(ROBOTS / name, period_s=5.0, harmonics=2, periods=1, slow_reversals=False)

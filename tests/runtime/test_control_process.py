@@ -106,7 +106,9 @@ def test_each_way_to_stop_a_running_arm(tmp_path: Path, way: object) -> None:
 
 
 @pytest.mark.parametrize("way", QUICK_BY_FILE)
-@pytest.mark.parametrize("call", ["connect", "enable", "exchange"])
+@pytest.mark.parametrize(
+    "call", [*(pytest.param(call, marks=pytest.mark.slow) for call in ("connect", "enable")), "exchange"]
+)
 def test_a_stop_while_the_backend_does_not_return(tmp_path: Path, way: object, call: str) -> None:
     last = {"connect": "connecting", "enable": "enabling", "exchange": "ramping"}[call]
     run, events = start(tmp_path / "run", settings={"block": call}, watchdog_s=0.5)

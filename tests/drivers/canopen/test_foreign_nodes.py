@@ -156,7 +156,7 @@ def logged_run(channel: str, joints: list[DriveJoint], log_file: Path) -> list[c
     return list(can.LogReader(str(log_file)))
 
 
-@pytest.mark.parametrize("form", ["asc", "log", "blf"])
+@pytest.mark.parametrize("form", ["asc", *(pytest.param(form, marks=pytest.mark.slow) for form in ("log", "blf"))])
 def test_a_run_decodes_cleanly_by_python_cans_own_log(
     channel: str, drives: list[ForeignDrive], tmp_path: Path, form: str
 ) -> None:

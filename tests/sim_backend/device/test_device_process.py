@@ -106,7 +106,7 @@ def assert_stopped_in_time(trace: DeviceTrace, instant_ns: int) -> None:
     assert np.abs(trace.position[-1] - trace.position[since < 0.0][-1]).max() < 0.2 * 0.3
 
 
-@pytest.mark.parametrize("kind", [signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.parametrize("kind", [signal.SIGKILL, pytest.param(signal.SIGSTOP, marks=pytest.mark.slow)])
 def test_the_arm_stops_when_its_host_is_killed_or_frozen(
     device: DeviceProcess, host: "subprocess.Popen[str]", kind: signal.Signals
 ) -> None:

@@ -90,6 +90,7 @@ def test_velocities_are_those_of_the_positions(run) -> None:
     np.testing.assert_allclose(velocity[1:-1], 0.5 * RATE_HZ * (q[2:] - q[:-2]), atol=0.02)
 
 
+@pytest.mark.slow
 def test_noise_steps_and_seed_are_the_scenarios() -> None:
     robot = bench_robot()
     scenario = Scenario(

@@ -85,6 +85,7 @@ def test_two_payloads_come_and_go_independently(planar: Any, planar_trial: Any) 
     np.testing.assert_allclose(one, other, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("profile", ["half_sine", "rectangular"])
 def test_contact_at_the_tool(profile: str, planar: Any, planar_trial: Any, agrees: Agree) -> None:
     force, start, duration = np.array([3.0, -8.0, 5.0]), 0.21, 0.33
@@ -122,6 +123,7 @@ def test_tilt_about_both_axes_turns_gravity(planar: Any) -> None:
     np.testing.assert_allclose(turned.gravity, expected, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("link", [1, 2])
 def test_link_length(link: int, planar: Any, planar_trial: Any, agrees: Agree) -> None:
     lengths = (0.53, 0.4) if link == 1 else (0.5, 0.43)

@@ -142,6 +142,7 @@ def test_a_link_that_hangs_straight_rests_between_its_teeth(beside: float, pendu
     assert plant.state.link_position[0] == pytest.approx(-np.pi / 2, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_teeth_lift_off_and_meet(pendulum: Any, pendulum_trial: Any) -> None:
     """Weightless link and small friction: the load reverses often, and the twist crosses the whole gap."""
     loose = pendulum.__class__(moment=1e-9, stiction=0.05, stribeck=0.0, viscous=0.02)

@@ -84,6 +84,7 @@ def test_a_held_arm_is_enabled_again_without_letting_go(name: str) -> None:
             assert bus.drives[0].power.state in (PowerState.QUICK_STOP_ACTIVE, PowerState.OPERATION_ENABLED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ACCEPTED)
 def test_a_drive_whose_host_is_gone_stops_by_itself(name: str) -> None:
     with EmulatedBus([Path(FOLDER / name)]) as bus:
