@@ -40,6 +40,7 @@ from tauscope.server.http.services import Services, open_services
 from tauscope.server.http.settings import Settings
 from tauscope.server.queue.job_folder import JobState
 from tauscope.server.queue.task_job import stage_workspace
+from tauscope.server.queue.worker_pool import WorkerPool
 from tauscope.tasks import identify, run
 from tauscope.tasks.campaign import HeldOutMotion
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
@@ -212,7 +213,8 @@ MOTION = ExcitationDesignOptions(starts=1, periods=2, slow_postures=1, closing_p
 
 def run_campaign(data: Path, robot_file: Path, scenario: Mapping[str, Any], told: Told) -> DiagnosisDocument:
     """Run a campaign on a simulated arm, and diagnose it. Raises TauscopeError if the campaign does not succeed."""
-    with open_services(Settings(data_folder=data)) as services:
+    pool = WorkerPool(1, niceness=0)  # no arm is stopped beside it, and other work would leave it no time at all
+    with open_services(Settings(data_folder=data), pool) as services:
         identifier = _begin(services, robot_file, scenario)
         _wait_for_end(services, identifier, told)
         found = get_result(identifier, services).diagnosis

@@ -60,6 +60,11 @@ class Quantity:
     period: float = np.inf
 
     @property
+    def is_known(self) -> bool:
+        """Whether the data say anything of it."""
+        return bool(np.isfinite(self.std))
+
+    @property
     def in_usual_unit(self) -> "Quantity":
         """The same in milliseconds where it is a short time."""
         if self.unit != "s" or abs(self.value) >= SHORT_S:

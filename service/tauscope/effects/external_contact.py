@@ -15,7 +15,6 @@ from tauscope.robot.robot import STANDARD_PARAMETERS
 
 LENGTHS_S = (0.5, 1.5, 4.5)  # lengths of the windows looked through [s]
 OVERLAP = 0.4  # part of a window that its neighbour covers too
-JOINTS_FOR_A_FORCE = 3  # joints from which the three components of a force can be told apart
 _WINDOW = (
     Shape("scope", "1", fixed=True, reported=False),
     Shape("t_0", "s"),
@@ -41,12 +40,11 @@ class ExternalContact(TimeLocalEffect):
 
     @classmethod
     def forms(cls, context: ArmContext) -> Sequence[Effect]:
-        """A force at the tool of an arm with enough joints, and a torque at every joint."""
+        """A force at the tool, and a torque at every joint."""
         grid, bounds = contact_windows(context.durations)
         if not len(grid):
             return []
-        whole = [cls(None, grid, *bounds)] if context.robot.joint_count >= JOINTS_FOR_A_FORCE else []
-        return [*whole, *(JointContact(joint, grid, *bounds) for joint in context.joints)]
+        return [cls(None, grid, *bounds), *(JointContact(joint, grid, *bounds) for joint in context.joints)]
 
     def claim(self, found: Sizes, context: ArmContext) -> str:
         force = replace(

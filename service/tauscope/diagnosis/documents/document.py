@@ -28,6 +28,7 @@ from tauscope.diagnosis.findings.finding import Finding
 from tauscope.diagnosis.findings.location import JointMismatch, Place
 from tauscope.diagnosis.findings.verdict import OPEN, Verdict
 from tauscope.diagnosis.findings.wrong_value import WrongValue
+from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.model.torque_scale import on_the_arm
 from tauscope.diagnosis.next_experiment import PlannedExperiment
 from tauscope.effects import Effect, Quantity, effect_class
@@ -43,6 +44,7 @@ _WIDE = "record one motion through the whole range of positions and speeds, slow
 # Standard parameters that are positive; a sum of such ones with positive weights is positive, too.
 POSITIVE = ("m", "Ixx", "Iyy", "Izz")
 POSITIVE_TERMS = ("stiction", "viscous", "rotor_inertia")
+UNFELT = 1e-9  # torque of a coefficient, relative to that of another one of the effect, which is rounding
 CLEARLY = 2.0  # standard errors below zero from which a value is worth a warning: nearer, it is zero
 
 
@@ -189,6 +191,7 @@ def _mismatch(found: JointMismatch, names: Sequence[str], *, significant: bool) 
 def _finding(finding: Finding, diagnosis: Diagnosis, names: Sequence[str], *, tentative: bool = False) -> FindingEntry:
     effect = finding.terms[0].effect
     quantities = _quantities(finding, diagnosis)
+    known = [each for each in quantities if each.is_known]
     others = list({rival.term.effect.name(names): None for rival in finding.alternatives})
     before, after = finding.before, finding.after
     return FindingEntry(
@@ -197,7 +200,7 @@ def _finding(finding: Finding, diagnosis: Diagnosis, names: Sequence[str], *, te
         probability=finding.probability,
         equivalent=others,
         equation=effect.equation,
-        parameters=[QuantityEntry(name=q.name, value=q.value, std=q.std, unit=q.unit) for q in quantities],
+        parameters=[QuantityEntry(name=q.name, value=q.value, std=q.std, unit=q.unit) for q in known],
         statement=state_finding(finding, quantities, diagnosis, tentative=tentative).text,
         gain=finding.gain,
         share=_share(finding, diagnosis, tentative=tentative),
@@ -219,14 +222,28 @@ def _headline(diagnosis: Diagnosis) -> str:
 
 
 def _quantities(finding: Finding, diagnosis: Diagnosis) -> list[Quantity]:
-    """Parameters of all terms; those after the first are numbered."""
+    """Parameters of all terms; those after the first are numbered, and what no joint feels is not known at all."""
     found: list[Quantity] = []
     for number, (term, covariance) in enumerate(zip(finding.terms, finding.covariances, strict=True), start=1):
-        sized = on_the_arm(diagnosis.selection.fit.model, term)
+        sized, unfelt = on_the_arm(diagnosis.selection.fit.model, term), _find_unfelt(term, diagnosis)
         own = sized.effect.quantities(diagnosis.setting, sized.coefficients, sized.shape, covariance)
         suffix = "" if number == 1 else f"_{number}"
-        found += [Quantity(f"{each.name}{suffix}", each.value, each.std, each.unit) for each in own]
+        stds = [np.inf if each.name in unfelt else each.std for each in own]
+        found += [
+            Quantity(f"{each.name}{suffix}", each.value, std, each.unit) for each, std in zip(own, stds, strict=True)
+        ]
     return found
+
+
+def _find_unfelt(term: Term, diagnosis: Diagnosis) -> set[str]:
+    """Coefficients of an effect that change no joint's torque on the recorded motion."""
+    model = diagnosis.selection.fit.model
+    columns = (
+        term.effect.columns(model.signals(piece), term.shape[None])[0] for piece in diagnosis.fitter.observations
+    )
+    largest = np.max([np.abs(own).reshape(len(own), -1).max(axis=1) for own in columns], axis=0)
+    names = [each.name for each in term.effect.coefficients]
+    return {name for name, size in zip(names, largest, strict=True) if size <= UNFELT * largest.max()}
 
 
 def _share(finding: Finding, diagnosis: Diagnosis, *, tentative: bool) -> float | None:

@@ -58,7 +58,8 @@ def state_finding(
 def numbers_text(quantities: Sequence[Quantity]) -> str:
     """The first parameters with 95 % intervals."""
     parts, any_interval = [], False
-    for each in (quantity.in_usual_unit for quantity in quantities[:MOST_NUMBERS]):
+    known = [each for each in quantities if each.is_known]
+    for each in (quantity.in_usual_unit for quantity in known[:MOST_NUMBERS]):
         value, reach = with_uncertainty(each.value, DEVIATIONS * each.std)
         unit = "" if each.unit == "1" else f" {each.unit}"
         parts.append(f"{each.name} = {value}{unit}" if reach == ABSENT else f"{each.name} = {value} ± {reach}{unit}")

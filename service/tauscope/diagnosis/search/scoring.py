@@ -110,7 +110,7 @@ class Scorer:
 def _factors(effect: Effect, shapes: Array, left: Array, outside: Array, mutual: Array, shares: Array) -> Scored:
     """Log Bayes factors from u and B of every shape."""
     own, whole = np.einsum("scc->sc", outside), np.einsum("scc->sc", mutual)
-    visible = ((own > INVISIBLE * whole) & (shares > 0.0)).all(axis=1)
+    visible = ((own > INVISIBLE * whole) & (shares > 0.0)).any(axis=1)
     sizes = SIZES[:, None, None] / np.where(shares > 0.0, shares, 1.0)
     gram = np.eye(left.shape[1]) + sizes[..., :, None] * outside * sizes[..., None, :]
     scaled = sizes * left

@@ -21,10 +21,10 @@ from tauscope.errors import LimitExceededError
 NICENESS = 10  # of a worker, so that the service answers a stop on a machine whose processors are all at work
 
 
-def serve_connection(connection: Connection, memory_bytes: int | None) -> None:
+def serve_connection(connection: Connection, memory_bytes: int | None, niceness: int) -> None:
     """Call functions until the other side is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the service's to handle
-    os.nice(NICENESS)
+    os.nice(niceness)
     threading.Thread(target=_end_with_service, daemon=True).start()
     if memory_bytes is not None:
         resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, memory_bytes))
@@ -77,9 +77,16 @@ _Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
 class WorkerPool(Executor):
     """Spawned processes, one BLAS thread each; `Future.cancel` kills the process, and a bound ends it."""
 
-    def __init__(self, workers: int, *, deadline_s: float | None = None, memory_bytes: int | None = None) -> None:
+    def __init__(
+        self,
+        workers: int,
+        *,
+        deadline_s: float | None = None,
+        memory_bytes: int | None = None,
+        niceness: int = NICENESS,
+    ) -> None:
         """`deadline_s`: of a call [s]; `memory_bytes`: data that a process may hold. Processes start when needed."""
-        self._deadline_s, self._memory_bytes = deadline_s, memory_bytes
+        self._deadline_s, self._memory_bytes, self._niceness = deadline_s, memory_bytes, niceness
         self._condition = threading.Condition()
         self._waiting: deque[tuple[Future[Any], _Call]] = deque()
         self._idle: list[_Worker] = []
@@ -163,7 +170,7 @@ class WorkerPool(Executor):
         """A process that is ready; raises OSError where none can be started."""
         with self._condition:
             worker = self._idle.pop() if self._idle else None
-        worker = worker or _Worker(self._memory_bytes)
+        worker = worker or _Worker(self._memory_bytes, self._niceness)
         with self._condition:
             self._busy.add(worker)
         return worker
@@ -214,12 +221,12 @@ def _settle(future: "Future[Any]", error: BaseException | None, result: Any = No
 
 
 class _Worker:
-    def __init__(self, memory_bytes: int | None) -> None:
+    def __init__(self, memory_bytes: int | None, niceness: int) -> None:
         context = get_context("spawn")
         self.connection: Connection
         self.connection, theirs = context.Pipe()
         self._is_ready = False
-        self._process = context.Process(target=serve_connection, args=(theirs, memory_bytes))
+        self._process = context.Process(target=serve_connection, args=(theirs, memory_bytes, niceness))
         try:
             with _limit_threads():
                 self._process.start()
