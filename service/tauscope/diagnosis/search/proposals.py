@@ -116,7 +116,8 @@ class Proposer:
                         looks.looked[name] = self._look_at(each, at, signals)
                     proposal = looks.looked[name]
                     if proposal is not None:
-                        seen.add(proposal.place)
+                        # A window explains whatever is left anywhere, and takes no place from what lasts.
+                        seen |= set() if isinstance(each[0].effect, TimeLocalEffect) else {proposal.place}
                         found += [proposal] if proposal not in found else []
         return sorted(found, key=lambda each: -each.log_factor)
 
