@@ -16,8 +16,11 @@ from concealed.real.concealing.kinds import KINDS
 from concealed.real.concealing.recorded_sets import CYCLE, SETS, set_of_seed
 from concealed.real.judging.solvable import solve_case
 from concealed.scoring.test_score import diagnosis
+from tauscope.diagnosis import diagnose, document
 from tauscope.diagnosis.documents.document import DiagnosisDocument
 from tauscope.effects import catalogue
+from tauscope.recording import read_recording
+from tauscope.robot import read_robot
 
 absent = [each.name for each in SETS.values() if not each.is_there]
 pytestmark = [
@@ -113,3 +116,22 @@ def test_the_oracle_solves_the_trial_from_its_files(name: str, seed: int, tmp_pa
     case.write(tmp_path)
     for each in solve_case(case, tmp_path) or []:
         assert each.is_right
+
+
+def test_a_push_on_one_servo_is_a_force_whose_part_along_the_axis_nobody_knows(tmp_path: Path) -> None:
+    case = draw_case(40_000_101)
+    case.write(tmp_path)
+    train, held_out = (
+        [read_recording(path) for path in sorted(tmp_path.glob(f"{kind}-*.csv"))] for kind in ("train", "held-out")
+    )
+    push, own = document(diagnose(read_robot(tmp_path / "robot.yaml"), train, held_out)).findings
+    assert (push.effect, push.joint, own.effect) == ("external_contact", None, "load_dependent_friction")
+    assert "F_z" not in push.statement
+    found = {each.name: each.value for each in push.parameters}
+    assert "F_z" not in found
+    (hidden,) = case.effects
+    constants = hidden.concealment.constants
+    pushed = hidden.total * (constants["F_x"] + 1j * constants["F_y"])
+    ratio = (found["F_x"] + 1j * found["F_y"]) / pushed
+    assert 0.67 < abs(ratio) < 1.5
+    assert abs(np.angle(ratio, deg=True)) < 10.0
