@@ -155,7 +155,8 @@ def test_plain_terms_are_the_nominal_columns() -> None:
         (0.3, (EVERY, 0.0, 6.0), 1.0, {"t_off": 2}),
         (-0.3, (EVERY, 0.0, 6.0), -1.0, {"t_on": 2}),
         (0.3, (EVERY, 5.0, 6.0), 1.0, {"t_on": 1, "t_off": 2}),
-        (-0.3, (EVERY, 5.0, 6.0), 1.0, {"t_on": 1, "t_off": 2}),
+        (-0.3, (EVERY, 5.0, 6.0), -1.0, {"t_off": 1, "t_on": 2}),
+        (-0.3, (EVERY, 0.0, 20.9), 1.0, {}),
         (0.3, (since(1), 5.0, 0.0), 1.0, {"t_on": 1}),
         (-0.3, (since(1), 5.0, 0.0), -1.0, {"t_off": 1}),
     ],
@@ -174,8 +175,9 @@ def test_what_is_let_go_is_the_opposite_outside_the_window_and_not_there_later(
     """Outside and inside make the whole of the training recordings; held-out ones are without."""
     effect = form(PayloadChange)
     inside = np.array([*window, 0.0, 0.1, 0.2, 0.3])
-    outside = effect.outside(inside) if isinstance(effect, PayloadChange) else None
-    assert outside is not None
+    assert isinstance(effect, PayloadChange)
+    ((turn, outside),) = effect.twins(inside, 2)
+    assert turn == -1.0
     time = np.arange(0.0, 20.0, 0.005)
     for recording in (0, 1):
         both = [open_share(shape, recording, time, 0.005) for shape in (inside, outside)]
@@ -183,6 +185,20 @@ def test_what_is_let_go_is_the_opposite_outside_the_window_and_not_there_later(
     assert not open_share(outside, -1, time, 0.005).any()
     sign, edges = carried(-0.3, inside, (20.0, 20.0))
     assert carried(0.3, outside, (20.0, 20.0)) == (-sign, edges)
+
+
+def test_one_training_recording_leaves_open_whether_others_have_its_window() -> None:
+    effect = form(ExternalContact)
+    assert isinstance(effect, ExternalContact)
+    window, every = np.array([0.0, 6.0, 9.0, 0.0]), np.array([EVERY, 6.0, 9.0, 0.0])
+    ((sign, twin),) = effect.twins(window, 1)
+    assert (sign, twin.tolist()) == (1.0, every.tolist())
+    assert not effect.twins(window, 2)
+    assert not effect.twins(every, 1)
+    time = np.arange(0.0, 20.0, 0.005)
+    assert np.array_equal(open_share(window, 0, time, 0.005), open_share(every, 0, time, 0.005))
+    assert open_share(every, -1, time, 0.005).any()
+    assert not open_share(window, -1, time, 0.005).any()
 
 
 def test_a_half_sine_of_no_length_is_nothing() -> None:

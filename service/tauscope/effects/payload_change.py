@@ -44,13 +44,14 @@ class PayloadChange(TimeLocalEffect):
         upper = np.array([len(context.durations) - 1.0, longest, 1.1 * longest, 0.0, *(FARTHEST_M,) * 3])
         return [cls(None, grid, lower, upper)] if len(grid) else []
 
-    def outside(self, shape: Array) -> Array | None:
-        """What is missing within a window is carried outside it: which of the two, training recordings cannot say."""
+    def twins(self, shape: Array, recordings: int) -> list[tuple[float, Array]]:
+        """…what is missing within a window, and carried outside it, among them."""
+        found = super().twins(shape, recordings)
         if shape[0] == EVERY:  # held-out recordings have it at the same instants
-            return None
+            return found
         other = shape.copy()
         other[3] = 0.0 if shape[3] == OUTSIDE else OUTSIDE
-        return other
+        return [*found, (-1.0, other)]
 
     def torque(self, signals: Signals, shape: Array) -> Array:
         """Torque of one kilogramme at r, (1, n, N)."""
@@ -99,10 +100,10 @@ def carried(mass: float, shape: Array, durations: Sequence[float]) -> tuple[floa
         return (1.0, {"t_on": 1}) if mass > 0.0 else (-1.0, {"t_off": 1})
     length = min(durations) if scope == EVERY else durations[int(scope)]
     from_begin, to_end = start < NEAR_EDGE * length, end > (1.0 - NEAR_EDGE) * length
-    if mass < 0.0 and from_begin != to_end:
-        return -1.0, {"t_on": 2} if from_begin else {"t_off": 1}
-    edges = {} if from_begin else {"t_on": 1}
-    return 1.0, edges if to_end else {**edges, "t_off": 2}
+    sign = -1.0 if mass < 0.0 and not (from_begin and to_end) else 1.0
+    first, last = ("t_on", "t_off") if sign > 0.0 else ("t_off", "t_on")
+    edges = {} if from_begin else {first: 1}
+    return sign, edges if to_end else {**edges, last: 2}
 
 
 def payload_windows(durations: Sequence[float]) -> Array:

@@ -32,9 +32,11 @@ class TimeLocalEffect(Effect):
     def torque(self, signals: Signals, shape: Array) -> Array:
         """Torque per unit of each coefficient, (c, m, N), of a shape, (k,), whose window is always open."""
 
-    def outside(self, shape: Array) -> Array | None:
-        """The shape, (k,), outside the window of one, (k,), in the training recordings, where meant; else None."""
-        return None
+    def twins(self, shape: Array, recordings: int) -> list[tuple[float, Array]]:
+        """Signs and shapes, (k,), that are the same in so many training `recordings`, and others in held-out ones."""
+        if recordings > 1 or shape[0] == EVERY:
+            return []
+        return [(1.0, np.concatenate([[EVERY], shape[1:]]))]
 
     def columns(self, signals: Signals, shapes: Array) -> Array:
         """The torque within the windows: `shapes`, (g, k), scope, start [s], end [s], profile, the effect's own."""

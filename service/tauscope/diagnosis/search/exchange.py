@@ -67,7 +67,8 @@ class Exchange:
         doubtful = [
             own
             for own, each in added.items()
-            if each.log_odds <= 0.0 or not self.gates.agrees(each.without, at, each.places)
+            if each.log_odds <= self.gates.find_least(at.model.terms[each.places[0]].effect, 0.0)
+            or not self.gates.agrees(each.without, at, each.places)
         ]
         return min(doubtful, key=lambda own: weighed[own].log_odds, default=None)
 
@@ -119,7 +120,7 @@ class Exchange:
                 nearer = gates.settle(nearer, touched)
                 odds = log_odds + gates.compare(at, nearer, touched) - CATALOGUED
             else:
-                nearer = laboratory.approach(nearer)
+                nearer = gates.find_twin(laboratory.approach(nearer), laboratory.approach)
                 odds = log_odds - trained + gates.log_odds(proposal) + gates.weigh_held_out(at, nearer)
             rivals.append(Rival(nearer.model.terms[-1], nearer.model, odds))
         rivals.sort(key=lambda each: -each.log_odds)

@@ -1,6 +1,6 @@
 """What training and held-out motion must say before an effect is named."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
 from tauscope.diagnosis.search.proposals import Proposal, Proposer
 from tauscope.diagnosis.search.window import window_log_odds
 from tauscope.effects import Effect, TimeLocalEffect
+from tauscope.effects.time_local import EVERY
 
 NAMED = 3.0  # log odds from which an effect is named, and from which training asks for it: nineteen in twenty
 # Log odds of held-out motion alone, of the joints that an effect touches, from which it is shown: three to one.
@@ -47,11 +48,10 @@ class Gates:
         touched = proposal.term.effect.touched(len(at.scales))
         found, lost = self._drop_impossible(self.settle(self.add(at, proposal), touched))
         trained = self.log_odds(proposal) - (self._weigh_lost(lost, at, found, proposal) if lost else 0.0)
-        passes = isinstance(proposal.term.effect, TimeLocalEffect)
-        if passes:
+        if isinstance(proposal.term.effect, TimeLocalEffect):
             trained = min(trained, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
         log_odds = trained + self.weigh_held_out(at, found)
-        confirmed = log_odds > (UNASKED if passes else NAMED) and stands(found.model)
+        confirmed = log_odds > self.find_least(proposal.term.effect, NAMED) and stands(found.model)
         asked = trained > NAMED
         if self.held_out is not None:  # what training does not ask for may cost no joint anything
             told = self.held_out.trained_change(at, found)
@@ -59,6 +59,11 @@ class Gates:
         confirmed = confirmed and self.agrees(at, found, [len(found.model.terms) - 1], asked=asked)
         covariance = found.posterior.covariance
         return Step(proposal.term.effect, log_odds, confirmed, at.model, found.model, covariance, trained), found
+
+    @staticmethod
+    def find_least(effect: Effect, least: float) -> float:
+        """Log odds from which an effect is there: `least`, and for a window in time more."""
+        return UNASKED if isinstance(effect, TimeLocalEffect) else least
 
     def _drop_impossible(self, at: Hypothesis) -> tuple[Hypothesis, list[Effect]]:
         """The same without what was found before its last effect and cannot be beside it, and what that is."""
@@ -77,10 +82,11 @@ class Gates:
         """Whether held-out motion shows an effect, and training predicts its joints no worse.
 
         What training does not ask for has to be beyond doubt, also in the table that a user sees. That decides alone
-        where the band has too few rows. No other motion shows a window in time.
+        where the band has too few rows. No other motion shows a window of one recording.
         """
-        effect = at.model.terms[places[0]].effect
-        if self.held_out is None or isinstance(effect, TimeLocalEffect):
+        term = at.model.terms[places[0]]
+        effect = term.effect
+        if self.held_out is None or (isinstance(effect, TimeLocalEffect) and term.shape[0] != EVERY):
             return True
         touched = effect.touched(len(at.scales))
         trained, least = self.held_out.trained_change(without, at), SHOWN if asked else UNASKED
@@ -116,24 +122,25 @@ class Gates:
         other = self.laboratory.settle(other, touched)
         compared = self.laboratory.under(other, found.dependence, touched)
         found = other if compared.log_evidence > found.log_evidence else found
-        return self._turn(found, touched)
+        return self.find_twin(found, lambda each: self.laboratory.settle(each, touched))
 
     def settle_without(self, at: Hypothesis, place: int) -> Hypothesis:
         """The most probable parameters without one term."""
         touched = at.model.terms[place].effect.touched(len(at.scales))
         return self.laboratory.settle(self.laboratory.without_term(at, place), touched)
 
-    def _turn(self, at: Hypothesis, touched: Sequence[int]) -> Hypothesis:
-        """The same effect outside its window where held-out motion says so: training cannot tell which of the two."""
+    def find_twin(self, at: Hypothesis, approach: Callable[[Hypothesis], Hypothesis]) -> Hypothesis:
+        """The hypothesis, or one whose last effect is a window that training cannot tell from it, as held-out says."""
         last = len(at.model.terms) - 1
-        term = at.model.terms[last]
-        outside = term.effect.outside(term.shape) if isinstance(term.effect, TimeLocalEffect) else None
-        if outside is None:
+        term, best = at.model.terms[last], at
+        if not isinstance(term.effect, TimeLocalEffect):
             return at
-        turned = replace(term, shape=outside, coefficients=-term.coefficients)
-        other = self.laboratory.with_term(self.laboratory.without_term(at, last), turned, at.sizes[last])
-        other = self.laboratory.settle(other, touched)
-        return other if self.weigh_held_out(at, other) > 0.0 else at
+        without = self.laboratory.without_term(at, last)
+        for sign, shape in term.effect.twins(term.shape, len(self.laboratory.rows.observations.names)):
+            twin = replace(term, shape=shape, coefficients=sign * term.coefficients)
+            other = approach(self.laboratory.with_term(without, twin, at.sizes[last]))
+            best = other if self.weigh_held_out(best, other) > 0.0 else best
+        return best
 
     def compare(self, at: Hypothesis, found: Hypothesis, touched: Collection[int]) -> float:
         """Log Bayes factor of a second hypothesis; what both predict alike of held-out motion says nothing."""

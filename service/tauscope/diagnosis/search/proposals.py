@@ -104,20 +104,22 @@ class Proposer:
         looks.scored.update(zip(map(id, new), made, strict=True))
         scored, found = [looks.scored[id(effect)] for effect in wanted], list[Proposal]()
         for kind in (0, 1):
-            seen = set[Place]()
+            seen, lasting = set[Place](), set[Place]()
             own = (each[kind].log_evidence for each in scored if _place(each) == instead)
             least = max(RIVALS * max(own, default=0.0), WORTH_A_LOOK)
             for each in sorted(scored, key=lambda each: -each[kind].log_evidence):
                 if each[kind].log_evidence < least:
                     break
-                if len(seen) < most or _place(each) in seen:  # with all forms of one effect
+                # With all forms of one effect. A window explains whatever is left, and takes no place from what lasts.
+                before = seen if isinstance(each[0].effect, TimeLocalEffect) else lasting
+                if len(before) < most or _place(each) in seen:
                     name = id(each[0].effect)
                     if name not in looks.looked:
                         looks.looked[name] = self._look_at(each, at, signals)
                     proposal = looks.looked[name]
                     if proposal is not None:
-                        # A window explains whatever is left anywhere, and takes no place from what lasts.
-                        seen |= set() if isinstance(each[0].effect, TimeLocalEffect) else {proposal.place}
+                        seen.add(proposal.place)
+                        before.add(proposal.place)
                         found += [proposal] if proposal not in found else []
         return sorted(found, key=lambda each: -each.log_factor)
 

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cmp_to_key
+from functools import cmp_to_key, partial
 
 import numpy as np
 
@@ -131,7 +131,12 @@ class Search:
             return asked
         held_out = self.gates.held_out
         approach = self.gates.laboratory.approach
-        approached = side_by_side(lambda each: approach(self.gates.add(at, each), 1), proposals)
+
+        def begin(proposal: Proposal) -> Hypothesis:
+            """The hypothesis with it after one step."""
+            return self.gates.find_twin(approach(self.gates.add(at, proposal), 1), partial(approach, steps=1))
+
+        approached = side_by_side(begin, proposals)
         nearer = {id(each): found for each, found in zip(proposals, approached, strict=True)}
         for each in proposals:
             if each not in asked and held_out.change(at, nearer[id(each)]).log_odds() > UNASKED:
