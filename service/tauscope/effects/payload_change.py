@@ -45,7 +45,7 @@ class PayloadChange(TimeLocalEffect):
         return [cls(None, grid, lower, upper)] if len(grid) else []
 
     def twins(self, shape: Array, recordings: int) -> list[tuple[float, Array]]:
-        """…what is missing within a window, and carried outside it, among them."""
+        """…a load outside the window of `shape`, (k,), in the place of one that is missing within it, among them."""
         found = super().twins(shape, recordings)
         if shape[0] == EVERY:  # held-out recordings have it at the same instants
             return found

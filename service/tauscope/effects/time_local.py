@@ -33,7 +33,7 @@ class TimeLocalEffect(Effect):
         """Torque per unit of each coefficient, (c, m, N), of a shape, (k,), whose window is always open."""
 
     def twins(self, shape: Array, recordings: int) -> list[tuple[float, Array]]:
-        """Signs and shapes, (k,), that are the same in so many training `recordings`, and others in held-out ones."""
+        """Signs and shapes that `shape`, (k,), is like in so many training `recordings`, and not in held-out ones."""
         if recordings > 1 or shape[0] == EVERY:
             return []
         return [(1.0, np.concatenate([[EVERY], shape[1:]]))]
