@@ -41,13 +41,16 @@ class Judge:
         return {each["id"]: each for each in answer.json()["identifications"]}
 
     def _wait_for_jobs(self) -> None:
-        """Until nothing is worked on any more; what waits then, waits for ever."""
-        queue = self._services.jobs
-        queue.settle()
-        while running := list(queue._running.values()):
-            _require(not wait(running, PATIENCE_S).not_done, "work does not come to an end")
+        """Until nothing is worked on any more; what waits then, waits for ever.
+
+        A look may begin what was interrupted, and another one may still write down what has ended: two find nothing.
+        """
+        queue, quiet = self._services.jobs, 0
+        while quiet < 2:
             queue.settle()
-        queue.settle()  # whoever takes the last end down has it written before this returns
+            running = list(queue._running.values())
+            quiet = 0 if running else quiet + 1
+            _require(not wait(running, PATIENCE_S).not_done, "work does not come to an end")
         stuck = [f"{each['id']} is {each['state']}" for each in self._jobs().values() if each["state"] in GOES_ON]
         _require(not stuck and queue.waiting() == 0, f"stuck: {stuck}, {queue.waiting()} wait")
 

@@ -142,7 +142,7 @@ class QueuedTask(Resource):
         formats = self.workspace.formats
         content = file_contents(*{file.media_type for file in formats.values()})
         schema = {"enum": [kind.value for kind in formats]}
-        problems = ("not-found", *answers.ENDINGS, "export", "recording", "identification", "worker-lost", "internal")
+        problems = dict.fromkeys((*self.work_problems, "export"))
 
         @router.get(
             "/{identifier}/exports/{format}",
@@ -150,7 +150,10 @@ class QueuedTask(Resource):
             summary="Fetch an export",
             description=self.export_words,
             response_class=Response,
-            responses={200: {"content": content, "description": "the file"}, **problem_responses(*problems)},
+            responses={
+                200: {"content": content, "description": "the file"},
+                **problem_responses("not-found", *answers.ENDINGS, *problems, "worker-lost", "internal"),
+            },
         )
         def get_export(
             identifier: answers.Identifier,
