@@ -228,10 +228,9 @@ def _quantities(finding: Finding, diagnosis: Diagnosis) -> list[Quantity]:
         sized, unfelt = on_the_arm(diagnosis.selection.fit.model, term), _find_unfelt(term, diagnosis)
         own = sized.effect.quantities(diagnosis.setting, sized.coefficients, sized.shape, covariance)
         suffix = "" if number == 1 else f"_{number}"
-        stds = [np.inf if each.name in unfelt else each.std for each in own]
-        found += [
-            Quantity(f"{each.name}{suffix}", each.value, std, each.unit) for each, std in zip(own, stds, strict=True)
-        ]
+        for each in own:
+            std = np.inf if each.name in unfelt else each.std
+            found.append(Quantity(f"{each.name}{suffix}", each.value, std, each.unit))
     return found
 
 
