@@ -52,6 +52,7 @@ def test_what_a_full_pipe_does_not_take_is_counted(tmp_path: Path, monkeypatch: 
     give(recorder, table)
     assert recorder.lost > 0
     gate.touch()
+    recorder.wait_until_open(ManualStop())
     assert recorder.close() is None
     kept = read_journal(path).rows
     assert len(kept) + recorder.lost == len(table)
