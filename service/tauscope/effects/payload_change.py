@@ -45,9 +45,9 @@ class PayloadChange(TimeLocalEffect):
         return [cls(None, grid, lower, upper)] if len(grid) else []
 
     def twins(self, shape: Array, recordings: int) -> list[tuple[float, Array]]:
-        """…a load outside the window of `shape`, (k,), in the place of one that is missing within it, among them."""
+        """Also a load outside the window of `shape`, (k,), where one is missing within it."""
         found = super().twins(shape, recordings)
-        if shape[0] == EVERY:  # held-out recordings have it at the same instants
+        if self.is_shared(shape):
             return found
         other = shape.copy()
         other[3] = 0.0 if shape[3] == OUTSIDE else OUTSIDE

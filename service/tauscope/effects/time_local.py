@@ -32,9 +32,17 @@ class TimeLocalEffect(Effect):
     def torque(self, signals: Signals, shape: Array) -> Array:
         """Torque per unit of each coefficient, (c, m, N), of a shape, (k,), whose window is always open."""
 
+    @staticmethod
+    def is_shared(shape: Array) -> bool:
+        """Whether held-out recordings have the window of `shape`, (k,), at the same instants."""
+        return bool(shape[0] == EVERY)
+
     def twins(self, shape: Array, recordings: int) -> list[tuple[float, Array]]:
-        """Signs and shapes that `shape`, (k,), is like in so many training `recordings`, and not in held-out ones."""
-        if recordings > 1 or shape[0] == EVERY:
+        """Signs and shapes, (k,), of the windows that only held-out recordings tell from that of `shape`, (k,).
+
+        `recordings`: number of training recordings.
+        """
+        if recordings > 1 or self.is_shared(shape):
             return []
         return [(1.0, np.concatenate([[EVERY], shape[1:]]))]
 

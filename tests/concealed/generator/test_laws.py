@@ -15,11 +15,8 @@ PUSH = {"effect": "external_contact", "joint": 2, "torque": 6.0, "start": 0.8, "
 LOAD = {"effect": "payload_change", "mass": 1.5, "offset": [0.05, 0.0, 0.1], "start": 0.9, "end": 2.1}
 
 
-OTHERS = [pytest.param(each, marks=pytest.mark.slow) for each in ({**PUSH, "profile": "rectangular"}, LOAD)]
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("entry", [{**PUSH, "profile": "half_sine"}, *OTHERS])
+@pytest.mark.parametrize("entry", [{**PUSH, "profile": "half_sine"}, {**PUSH, "profile": "rectangular"}, LOAD])
 def test_it_is_what_the_simulated_drives_need_more(
     entry: Entry, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -124,8 +124,10 @@ def test_a_push_on_one_servo_is_a_force_whose_part_along_the_axis_nobody_knows(t
     train, held_out = (
         [read_recording(path) for path in sorted(tmp_path.glob(f"{kind}-*.csv"))] for kind in ("train", "held-out")
     )
-    push, own = document(diagnose(read_robot(tmp_path / "robot.yaml"), train, held_out)).findings
+    told = document(diagnose(read_robot(tmp_path / "robot.yaml"), train, held_out))
+    push, own = told.findings
     assert (push.effect, push.joint, own.effect) == ("external_contact", None, "load_dependent_friction")
+    assert all(each.visible for each in told.detectable if each.effect == push.effect)
     assert "F_z" not in push.statement
     found = {each.name: each.value for each in push.parameters}
     assert "F_z" not in found

@@ -74,11 +74,10 @@ CASES: dict[str, tuple[list[Any], Callable[..., Any]]] = {
 }
 
 
-QUICK = ("friction behind a rotor", "friction and ripple")
-EVERY_CASE = [pytest.param(each, marks=() if each in QUICK else pytest.mark.slow) for each in CASES]
+QUICK = "friction and ripple"
+EVERY_CASE = [pytest.param(each, marks=() if each == QUICK else pytest.mark.slow) for each in CASES]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY_CASE)
 def test_what_the_load_costs(name: str, planar: Any, planar_trial: Any, agrees: Agree) -> None:
     effects, rates = CASES[name]

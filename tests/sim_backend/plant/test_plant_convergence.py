@@ -49,12 +49,8 @@ def end(robot: Robot, effects: Sequence[Any], step_s: float) -> Array:
     return np.array(rows)
 
 
-QUICK = ("friction", "bristles")
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in CASES]
+    "name", [name if name == "friction" else pytest.param(name, marks=pytest.mark.slow) for name in CASES]
 )
 def test_second_order(name: str, paper: Robot) -> None:
     robot = paper

@@ -28,6 +28,7 @@ from tauscope.diagnosis.findings.finding import Finding
 from tauscope.diagnosis.findings.location import JointMismatch, Place
 from tauscope.diagnosis.findings.verdict import OPEN, Verdict
 from tauscope.diagnosis.findings.wrong_value import WrongValue
+from tauscope.diagnosis.fitting.projection import INVISIBLE
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.model.torque_scale import on_the_arm
 from tauscope.diagnosis.next_experiment import PlannedExperiment
@@ -44,7 +45,6 @@ _WIDE = "record one motion through the whole range of positions and speeds, slow
 # Standard parameters that are positive; a sum of such ones with positive weights is positive, too.
 POSITIVE = ("m", "Ixx", "Iyy", "Izz")
 POSITIVE_TERMS = ("stiction", "viscous", "rotor_inertia")
-UNFELT = 1e-9  # torque of a coefficient, relative to that of another one of the effect, which is rounding
 CLEARLY = 2.0  # standard errors below zero from which a value is worth a warning: nearer, it is zero
 
 
@@ -235,14 +235,16 @@ def _quantities(finding: Finding, diagnosis: Diagnosis) -> list[Quantity]:
 
 
 def _find_unfelt(term: Term, diagnosis: Diagnosis) -> set[str]:
-    """Coefficients of an effect that change no joint's torque on the recorded motion."""
+    """Coefficients of an effect that change no joint's torque on the recorded motion; a single one does."""
+    if len(term.coefficients) == 1:
+        return set()
     model = diagnosis.selection.fit.model
     columns = (
         term.effect.columns(model.signals(piece), term.shape[None])[0] for piece in diagnosis.fitter.observations
     )
     largest = np.max([np.abs(own).reshape(len(own), -1).max(axis=1) for own in columns], axis=0)
     names = [each.name for each in term.effect.coefficients]
-    return {name for name, size in zip(names, largest, strict=True) if size <= UNFELT * largest.max()}
+    return {name for name, size in zip(names, largest, strict=True) if size**2 <= INVISIBLE * largest.max() ** 2}
 
 
 def _share(finding: Finding, diagnosis: Diagnosis, *, tentative: bool) -> float | None:

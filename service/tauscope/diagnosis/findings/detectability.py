@@ -36,7 +36,7 @@ class Visibility:
     """How much a form of an effect shows beside a fitted model."""
 
     effect: Effect
-    # energy of its first column for a size of one, at a usual shape; zero where it does not show [noise variances]
+    # energy of the first column that shows, for a size of one, at a usual shape; zero where none does [noise variances]
     information: float
     shapes_tried: float  # effective number of shapes among which chance may choose
 
@@ -61,11 +61,13 @@ def _visibility(
     shapes = effect.grid[np.sort(drawn)]
     columns = white_columns(observations, effect, shapes, signals)
     found = moments(fit.projection, columns)
-    visible = (found.shares > INVISIBLE).all(axis=1)
+    alike = np.array([each.unit == effect.coefficients[0].unit for each in effect.coefficients])
+    shows = (found.shares > INVISIBLE) & alike
+    visible, first = shows.any(axis=1), shows.argmax(axis=1)
     if not visible.any():
         return Visibility(effect, 0.0, 1.0)
     number = effective_number(found, columns, rng) if len(shapes) > 1 else 1.0
-    information = float(np.median(found.gram[visible, 0, 0]))
+    information = float(np.median(found.gram[visible, first[visible], first[visible]]))
     return Visibility(effect, information, number * len(effect.grid) / len(shapes))
 
 
@@ -128,7 +130,7 @@ def effective_number(found: Moments, columns: Mapping[int, Array], rng: np.rando
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     known = values > 1e-9 * values[-1]
     draws = (vectors[:, known] * np.sqrt(values[known])) @ rng.standard_normal((int(known.sum()), DRAWS))
-    visible = np.flatnonzero((found.shares > INVISIBLE).all(axis=1))
+    visible = np.flatnonzero((found.shares > INVISIBLE).any(axis=1))
     sizes = scale.reshape(shapes, count)[visible]
     own = found.gram[visible] / (sizes[:, :, None] * sizes[:, None, :])
     largest = np.zeros(DRAWS)

@@ -67,7 +67,7 @@ class Exchange:
         doubtful = [
             own
             for own, each in added.items()
-            if each.log_odds <= self.gates.find_least(at.model.terms[each.places[0]].effect, 0.0)
+            if each.log_odds <= self.gates.find_threshold(at.model.terms[each.places[0]].effect, 0.0)
             or not self.gates.agrees(each.without, at, each.places)
         ]
         return min(doubtful, key=lambda own: weighed[own].log_odds, default=None)

@@ -13,7 +13,6 @@ from tauscope.diagnosis.search.hypothesis import Hypothesis, Laboratory
 from tauscope.diagnosis.search.proposals import Proposal, Proposer
 from tauscope.diagnosis.search.window import window_log_odds
 from tauscope.effects import Effect, TimeLocalEffect
-from tauscope.effects.time_local import EVERY
 
 NAMED = 3.0  # log odds from which an effect is named, and from which training asks for it: nineteen in twenty
 # Log odds of held-out motion alone, of the joints that an effect touches, from which it is shown: three to one.
@@ -51,7 +50,7 @@ class Gates:
         if isinstance(proposal.term.effect, TimeLocalEffect):
             trained = min(trained, window_log_odds(at, found, found.model.terms[-1], self.laboratory))
         log_odds = trained + self.weigh_held_out(at, found)
-        confirmed = log_odds > self.find_least(proposal.term.effect, NAMED) and stands(found.model)
+        confirmed = log_odds > self.find_threshold(proposal.term.effect, NAMED) and stands(found.model)
         asked = trained > NAMED
         if self.held_out is not None:  # what training does not ask for may cost no joint anything
             told = self.held_out.trained_change(at, found)
@@ -61,9 +60,9 @@ class Gates:
         return Step(proposal.term.effect, log_odds, confirmed, at.model, found.model, covariance, trained), found
 
     @staticmethod
-    def find_least(effect: Effect, least: float) -> float:
-        """Log odds from which an effect is there: `least`, and for a window in time more."""
-        return UNASKED if isinstance(effect, TimeLocalEffect) else least
+    def find_threshold(effect: Effect, usual: float) -> float:
+        """Log odds from which an effect is there: the `usual` ones, and for a window in time more."""
+        return UNASKED if isinstance(effect, TimeLocalEffect) else usual
 
     def _drop_impossible(self, at: Hypothesis) -> tuple[Hypothesis, list[Effect]]:
         """The same without what was found before its last effect and cannot be beside it, and what that is."""
@@ -86,7 +85,7 @@ class Gates:
         """
         term = at.model.terms[places[0]]
         effect = term.effect
-        if self.held_out is None or (isinstance(effect, TimeLocalEffect) and term.shape[0] != EVERY):
+        if self.held_out is None or (isinstance(effect, TimeLocalEffect) and not effect.is_shared(term.shape)):
             return True
         touched = effect.touched(len(at.scales))
         trained, least = self.held_out.trained_change(without, at), SHOWN if asked else UNASKED

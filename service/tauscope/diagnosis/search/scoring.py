@@ -16,13 +16,13 @@ from scipy.special import logsumexp
 from tauscope.diagnosis.evidence.linear_model import Posterior
 from tauscope.diagnosis.evidence.rows import EvidenceRows
 from tauscope.diagnosis.evidence.scales import Scales
+from tauscope.diagnosis.fitting.projection import INVISIBLE
 from tauscope.diagnosis.search.hypothesis import Hypothesis
 from tauscope.effects import Effect, TimeLocalEffect
 from tauscope.recording.recording import Array
 
 # Rms of an effect's torque that is believed possible, as share of the joint's measured torque.
 SIZES = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
-INVISIBLE = 1e-7  # share of a column outside the model's below which no data of this kind can show it
 
 
 @dataclass(frozen=True, eq=False)
