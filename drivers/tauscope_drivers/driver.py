@@ -1,8 +1,7 @@
 """The description of a driver: its words, its options, and what it does beside moving an arm.
 
-A driver is one package, whose module ``driver`` holds one `Driver` object, ``DRIVER``. A package of `tauscope_drivers`
-is found by that, any other by an entry point ``tauscope.drivers``. The module imports bus libraries only inside its
-methods: choices and help read its words alone.
+A driver is one package, whose module ``driver`` holds one `Driver` object. An entry point ``tauscope.drivers`` names
+that object. The module imports bus libraries only inside its methods: choices and help read its words alone.
 """
 
 from abc import ABC, abstractmethod
