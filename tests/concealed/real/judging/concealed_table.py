@@ -17,7 +17,7 @@ HEAD = (
     "size inside",
     "new wrong names",
     "confident",
-    "energy removed",
+    "energy removed: median, mean",
     "joints worse",
     "time [s]",
 )
@@ -81,7 +81,7 @@ def _row(name: str, these: Sequence[tuple[Named, Judged]]) -> str:
         _share(sizes),
         f"{sum(len(told.wrong) for told in trials) / max(len(trials), 1):.2f} a trial",
         str(sum(len(told.confident) for told in trials)),
-        f"{np.mean(removed):.0%} of {len(removed)}" if removed else "",
+        f"{np.median(removed):.0%}, {np.mean(removed):.0%} of {len(removed)}" if removed else "",
         f"{sum(len(told.worse) for told in trials) / max(len(trials), 1):.2f} a trial",
         f"{np.mean([told.seconds for told in trials]):.0f}" if trials else "",
     ]
