@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tauscope.diagnosis.findings.diagnosed import Diagnosis
-from tauscope.diagnosis.findings.finding import FORMULA_ERROR, Finding
+from tauscope.diagnosis.findings.finding import Finding
 from tauscope.effects import Effect, Quantity, TimeLocalEffect
 from tauscope.number_text import ABSENT, chance, significant, with_uncertainty
 
@@ -83,6 +83,8 @@ def _rivals(finding: Finding, names: Sequence[str]) -> str:
     """What it could also be."""
     own = finding.terms[0].effect
     rivals = list(dict.fromkeys(_noun(rival.term.effect, own, names) for rival in finding.alternatives))
+    if finding.formula is not None:
+        rivals.insert(0, f"an error of the formula of {_noun(finding.formula, own, names)}")
     if not rivals:
         return ""
     shown, more = rivals[:MOST_RIVALS], len(rivals) - MOST_RIVALS
@@ -97,17 +99,10 @@ def _noun(rival: Effect, own: Effect, names: Sequence[str]) -> str:
 
 def _doubts(finding: Finding, diagnosis: Diagnosis, names: Sequence[str]) -> Iterator[str]:
     """Why it may be something else, beside its rivals."""
-    joints = finding.terms[0].effect.touched(len(names))
-    others = (each for each in diagnosis.findings if each.place != finding.place)
-    beside = [each for each in others if not set(joints).isdisjoint(each.terms[0].effect.touched(len(names)))]
-    larger = max(beside, key=lambda each: each.gain, default=None)
-    if larger is not None and finding.gain < FORMULA_ERROR * larger.gain:
-        law = larger.terms[0].effect
-        where = " ".join(filter(None, (law.id.replace("_", " "), law.place(names))))
-        yield f"It is small: the formula of {where} may cause it"
     left = diagnosis.misfit_after
-    if any(left.significant[joint] and left.excess[joint] > finding.gain for joint in joints):
-        yield "Low confidence: unmodelled physics may be causing this"
+    for joint in finding.terms[0].effect.touched(len(names)):
+        if left.significant[joint] and left.excess[joint] > finding.gain:
+            yield f"More than it explains is left at {names[joint]}: unmodelled physics may be causing this"
 
 
 def _held_out(finding: Finding, names: Sequence[str], *, tentative: bool) -> str:

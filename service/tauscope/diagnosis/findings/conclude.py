@@ -9,6 +9,7 @@ from tauscope.diagnosis.findings.constancy import constancy
 from tauscope.diagnosis.findings.detectability import Detectable, detectable, detectable_parameters, visibilities
 from tauscope.diagnosis.findings.diagnosed import Diagnosis, Selection, Unseen
 from tauscope.diagnosis.findings.finding import Finding, FitSizes, equivalent, in_order
+from tauscope.diagnosis.findings.formula_error import doubt_formulas
 from tauscope.diagnosis.findings.location import locate
 from tauscope.diagnosis.findings.plain import states_friction
 from tauscope.diagnosis.fitting.fit import Fit, Fitter
@@ -102,7 +103,8 @@ def _findings(
                 confirmed=None if unseen is None else True,
             )
         )
-    return in_order(found)
+    sites = len({(each.id, each.joint) for each in searched.effects})
+    return in_order(doubt_formulas(found, sites))
 
 
 def _tentative(steps: Sequence[Step], found: set[Place], fitter: Fitter, unseen: Unseen | None) -> tuple[Finding, ...]:

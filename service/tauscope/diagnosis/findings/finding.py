@@ -11,11 +11,12 @@ from tauscope.diagnosis.model.residual import raw_squares
 from tauscope.diagnosis.model.term import Place, Term
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.search.found import Rival
+from tauscope.effects import Effect
 from tauscope.recording.recording import Array
 
 # Log odds within which data do not tell two effects apart: a small error of the columns decides between them.
 EQUIVALENT = 5.0
-# Part of an effect's log odds that counts as nothing between two laws: no formula is exactly that of an arm.
+# Part of an effect's energy or log odds that counts as nothing between two laws: no formula is exactly that of an arm.
 FORMULA_ERROR = 0.05
 
 
@@ -52,6 +53,22 @@ class Finding:
     alternatives: tuple[Rival, ...] = ()  # effects that these data cannot tell from it
     confirmed: bool | None = None  # by motion that was not used; None where there was none
     in_model: bool = True
+    formula: Effect | None = None  # the law whose error may be all that this one explains (`formula_error`)
+
+    @property
+    def is_touched(self) -> Array:
+        """Whether they change a joint's torque, (n,)."""
+        count = len(self.after.train)
+        return np.isin(np.arange(count), self.terms[0].effect.touched(count))
+
+    @property
+    def explained(self) -> Array:
+        """Squares that they take off the residuals of these joints, training and held-out, in what is left, (n,)."""
+        taken = self.before.train**2 - self.after.train**2
+        if self.before.held_out is not None and self.after.held_out is not None:
+            taken = taken + self.before.held_out**2 - self.after.held_out**2
+        left = np.maximum(self.after.train**2, np.finfo(float).tiny)
+        return np.where(self.is_touched, np.maximum(taken / left, 0.0), 0.0)
 
     @property
     def place(self) -> Place:
