@@ -11,12 +11,14 @@ from tauscope.diagnosis.search.found import Step
 from tauscope.effects.joint_spring import JointSpring
 
 
-def step(joint: int, stiffness: float, *, trained: float = 9.0, is_confirmed: bool = False) -> Step:
+def step(
+    joint: int, stiffness: float, *, trained: float = 9.0, is_confirmed: bool = False, log_odds: float = -1.0
+) -> Step:
     """A spring that was tried beside the sound arm's model."""
     nominal = sound_arm().selection.fit.model
     term = Term(JointSpring(joint), np.zeros(0), np.array([stiffness]))
     after = with_terms(nominal, [*nominal.terms, term])
-    return Step(term.effect, -5.0, is_confirmed, nominal, after, np.eye(after.size), trained)
+    return Step(term.effect, log_odds, is_confirmed, nominal, after, np.eye(after.size), trained)
 
 
 def tentative(*steps: Step, found: frozenset[Place] = frozenset()) -> list[Finding]:
@@ -42,6 +44,11 @@ def test_what_training_does_not_show_or_motion_confirms_or_is_found_is_not_tenta
     assert not tentative(step(0, 0.5, trained=-1.0))
     assert not tentative(step(0, 0.5, is_confirmed=True))
     assert not tentative(step(0, 0.5), found=frozenset({("joint_spring", 0)}))
+
+
+def test_what_is_refuted_at_twenty_to_one_is_not_told() -> None:
+    assert tentative(step(0, 0.5, log_odds=-2.9))
+    assert not tentative(step(0, 0.5, log_odds=-3.1))
 
 
 def test_each_place_has_its_own() -> None:

@@ -21,6 +21,7 @@ from tauscope.diagnosis.model.torque_scale import covariance_on_the_arm
 from tauscope.diagnosis.observations.observations import Observations
 from tauscope.diagnosis.search.found import Step
 from tauscope.diagnosis.search.from_recordings import Searched, measure_lack, rows_under, weigh
+from tauscope.diagnosis.search.gates import NAMED
 from tauscope.diagnosis.search.hypothesis import Hypothesis
 from tauscope.effects.payload import Payload
 from tauscope.effects.plain_terms import TorqueOffset
@@ -108,10 +109,14 @@ def _findings(
 
 
 def _tentative(steps: Sequence[Step], found: set[Place], fitter: Fitter, unseen: Unseen | None) -> tuple[Finding, ...]:
-    """Effects that training shows and held-out motion refutes, each as it was tried last."""
+    """Effects that training shows and held-out motion does not confirm, each as it was tried last.
+
+    What both together refute as surely as something is named is not worth a word.
+    """
     refuted = {step.place: step for step in steps if not step.is_confirmed and step.trained_log_odds > 0.0}
+    told = {place: step for place, step in refuted.items() if step.log_odds > -NAMED and place not in found}
     tentative = []
-    for step in (step for place, step in refuted.items() if place not in found):
+    for step in told.values():
         before, after = (fitter.projected(model) for model in (step.before, step.after))
         sizes = (FitSizes.of(model, fitter.observations, _rows(unseen)) for model in (step.before, step.after))
         place = len(step.after.terms) - 1
