@@ -74,5 +74,5 @@ def test_the_headline_names_the_formula_beside_the_probability() -> None:
         context(), own.terms[0].coefficients, own.terms[0].shape, own.covariances[0]
     )
     statement = state_finding(own, quantities, words_of(own), tentative=False)
-    assert statement.headline.endswith(f"at {NAMES[1]} (2 %; or an error of the formula of cable force)")
+    assert statement.headline.endswith(f"at {NAMES[1]} (2 %; or an error in the formula of cable force)")
     assert statement.text.endswith("do not act on this alone.")

@@ -84,7 +84,7 @@ def _rivals(finding: Finding, names: Sequence[str]) -> str:
     own = finding.terms[0].effect
     rivals = list(dict.fromkeys(_noun(rival.term.effect, own, names) for rival in finding.alternatives))
     if finding.formula is not None:
-        rivals.insert(0, f"an error of the formula of {_noun(finding.formula, own, names)}")
+        rivals.insert(0, f"an error in the formula of {_noun(finding.formula, own, names)}")
     if not rivals:
         return ""
     shown, more = rivals[:MOST_RIVALS], len(rivals) - MOST_RIVALS
