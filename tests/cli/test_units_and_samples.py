@@ -99,7 +99,7 @@ def test_a_sample_index_has_a_rate(run: Run, files: SimulatedFiles, tmp_path: Pa
     assert "state their rate" in ended.err
 
 
-@pytest.mark.parametrize("words", ["t=min", "t", "q=deg,q=rad", "speed=rpm"])
+@pytest.mark.parametrize("words", ["t=h", "t", "q=deg,q=rad", "speed=rpm"])
 def test_units_that_are_none_are_wrong_usage(run: Run, files: SimulatedFiles, words: str) -> None:
     ended = run("identify", files.robot, files.train[0], "--units", words)
     assert ended.status == 2

@@ -6,15 +6,17 @@ from dataclasses import dataclass, replace
 
 from tauscope.errors import RecordingError, RecordingMismatchError
 from tauscope.number_text import counted
+from tauscope.recording.csv_dialect import is_number
 from tauscope.recording.layout.families import BY_NAME, role_of, words_of
 from tauscope.recording.layout.guess import guess_layout, is_numbered, layout_text
 from tauscope.recording.layout.presets import PRESET_OF
 from tauscope.recording.layout.rename import NANOSECONDS, rename_columns
 from tauscope.recording.samples import EffortKind
+from tauscope.recording.unit_text import collect_units, root_of, stated_unit
 from tauscope.recording.units import Reading
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.messages import listed, printable
-from tauscope.robot.recording_layout import RecordingLayout
+from tauscope.robot.recording_layout import UNITS, RecordingLayout
 
 # Columns of which a joint may have one, in the order in which a table keeps them.
 OPTIONAL_GROUPS = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt", "kp")
@@ -60,8 +62,7 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
         layout = find_columns(["t", *renamed] if counts_rows else renamed, file, counts_rows=counts_rows)
         return replace(layout, notes=_note_command(header, renamed))
     except RecordingError as error:
-        named = [name for name in header if name]
-        if reading.columns is not None or isinstance(error, RecordingMismatchError) or len(set(named)) < len(named):
+        if reading.columns is not None or isinstance(error, RecordingMismatchError):
             raise
         guess = suggest_layout(header, reading, file)
         if guess is None:
@@ -81,11 +82,13 @@ def suggest_layout(header: Sequence[str], reading: Reading, file: str) -> Record
     guess = guess_layout(header, reading.joint_names, prefers_torque=reading.prefers_torque)
     if guess is None:
         return None
+    units = _units_of_tool(header, reading, guess)
     try:
-        find_columns(rename_columns(header, replace(reading, columns=guess.columns), file), file)
+        layout = find_columns(rename_columns(header, replace(reading, columns=guess.columns), file), file)
+        units = {**units, **units_of_names(header, layout, replace(reading, units=units), file)}
     except RecordingError:
         return None
-    return replace(guess, units={**_units_of_tool(header, reading, guess), **guess.units})
+    return replace(guess, units=units)
 
 
 def _units_of_tool(header: Sequence[str], reading: Reading, guess: RecordingLayout) -> Mapping[str, str]:
@@ -127,7 +130,56 @@ def find_layout(header: Sequence[str], reading: Reading, file: str) -> tuple[Rea
             rename_columns(header, reading, file)
         except RecordingError:
             reading = replace(reading, columns=None, units={}, rate_hz=None)
-    return reading, map_columns(header, reading, file)
+    layout = map_columns(header, reading, file)
+    return replace(reading, units={**units_of_names(header, layout, reading, file), **reading.units}), layout
+
+
+def units_of_names(header: Sequence[str], layout: ColumnLayout, reading: Reading, file: str) -> dict[str, str]:
+    """Units that the names of columns state, where nobody else states them. Raises RecordingError for unknown ones."""
+    names = {name: header[index] for name, index in zip(layout.names, layout.source, strict=True)}
+    asked = {name for name in names if not {name, root_of(name)}.intersection(reading.units)}
+    texts = {name: stated_unit(name, text) for name, text in names.items() if name in asked}
+    units = collect_units({name: text for name, text in texts.items() if text not in (reading.joint_names or ())})
+    for target, unit in units.items():
+        known = UNITS[root_of(target)]
+        if unit not in known:
+            column = next(name for column, name in names.items() if target in (column, root_of(column)))
+            raise RecordingError(
+                f"{file}: column {printable(column)}: {printable(unit)} is no unit that is known; state it by --units "
+                f"{target}=UNIT, of {', '.join(known)}, or convert the column"
+            )
+    return units
+
+
+def order_by_cells(
+    header: Sequence[str], layout: ColumnLayout, cells: Sequence[str], reading: Reading, file: str
+) -> ColumnLayout:
+    """The same with each joint's columns in the place of its name, where a file names the joints in its rows.
+
+    So do logs of ROS messages as text: ``name0, name1, …, position0, …``. `cells`: of the first row. Raises
+    RecordingMismatchError where these name other joints.
+    """
+    robot = reading.joint_names or ()
+    is_by_place = reading.columns is not None and BY_NAME not in str(reading.columns)
+    if len(robot) < 2 or not is_by_place:
+        return layout
+    named = [cell for name, cell in zip(header, cells, strict=False) if "name" in words_of(name)]
+    if is_numbered(header):  # the texts before the numbers, of which a frame may be the first
+        named = [cell for cell in cells if not is_number(cell.encode()) and cell][-len(robot) :]
+    if len(named) != len(robot):
+        return layout
+    if set(named) != set(robot):
+        raise RecordingMismatchError(
+            f"{file}: the rows name the joints {listed(named)}, the robot's are {listed(robot)}; name the robot's "
+            "joints as the recording does"
+        )
+    where = dict(zip(layout.names, layout.source, strict=True))
+    moved = {}
+    for group in {name.rstrip("0123456789") for name in layout.names}:
+        columns = sorted(index for name, index in where.items() if name.rstrip("0123456789") == group)
+        if len(columns) == len(robot):
+            moved |= {f"{group}{joint}": columns[named.index(name)] for joint, name in enumerate(robot, 1)}
+    return replace(layout, source=tuple((where | moved)[name] for name in layout.names))
 
 
 def find_columns(header: Sequence[str], file: str, *, counts_rows: bool = False) -> ColumnLayout:
@@ -172,7 +224,7 @@ def _positions(header: Sequence[str], file: str) -> dict[str, int]:
     """Index of every named column; unnamed ones (pandas writes its index so) are nobody's."""
     where: dict[str, int] = {}
     for index, name in enumerate(header):
-        if name in where:
+        if name in where and is_column(name):
             raise RecordingError(
                 f"{file}: column {printable(name)} appears twice (as columns {where[name] + 1} and {index + 1}); "
                 "rename or delete one"

@@ -8,7 +8,7 @@ and both round correctly, so they agree on every text that both take; what the q
 import csv
 import re
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
@@ -21,8 +21,11 @@ from tauscope.recording.samples import Array
 _NUMBER_BYTES = b"0123456789+-.eE \tnaN"
 _NOT_SEPARATORS = bytes(set(range(256)) - set(b",\n"))
 _NUMBER = re.compile(rb"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
-_MISSED = re.compile(rb"[+-]?nan", re.IGNORECASE)
+# What programs write where a sample was missed: pandas, R, Excel (German, too) and the C library of Windows.
+_MISSED = re.compile(rb"[+-]?(?:nan(?:\(ind\))?|1\.#(?:IND|QNAN))|-|#?n/?a|#nv|<na>|null|none", re.IGNORECASE)
 _DATE = re.compile(rb"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ]|[0-9]{2}:[0-9]{2}:")
+_GERMAN_DATE = re.compile(rb"([0-9]{2})\.([0-9]{2})\.([0-9]{4})[T ]+([0-9]{2}:[0-9]{2}:[0-9]{2}(?:[.,][0-9]+)?)")
+_DURATION = re.compile(rb"([0-9]+) days? ([0-9]{2}):([0-9]{2}):([0-9]{2}(?:\.[0-9]+)?)")  # as pandas writes it
 _SHOWN_CHARACTERS = 40
 
 
@@ -71,7 +74,7 @@ def _parse_numbers(text: bytes) -> Array | None:
 
 
 def parse_number(field: bytes, file: str, line: int, column: str) -> float:
-    """A decimal number, NaN where the field is empty or ``nan``. Raises RecordingError for anything else."""
+    """A decimal number, NaN where the field says that there is none. Raises RecordingError for anything else."""
     text = field.strip(b" \t")
     if not text or _MISSED.fullmatch(text):
         return np.nan
@@ -84,7 +87,7 @@ def parse_number(field: bytes, file: str, line: int, column: str) -> float:
 
 
 class Clock:
-    """Reads a file's column t: numbers, or dates or times of day of ISO 8601, as seconds since the first."""
+    """Reads a file's column t: numbers, durations, or dates or times of day, as seconds since the first."""
 
     def __init__(self) -> None:
         self._first: datetime | None = None
@@ -92,11 +95,17 @@ class Clock:
     def parse(self, field: bytes, file: str, line: int) -> float:
         """Time of a row, in the file's own unit. Raises RecordingError where it is neither a number nor a date."""
         text = field.strip(b' \t"')
+        if duration := _DURATION.fullmatch(text):
+            days, hours, minutes, seconds = (float(part or 0) for part in duration.groups())
+            return ((24.0 * days + hours) * 60.0 + minutes) * 60.0 + seconds
+        if german := _GERMAN_DATE.fullmatch(text):
+            day, month, year, time = german.groups()
+            text = b"%s-%s-%sT%s" % (year, month, day, time.replace(b",", b"."))
         if not _DATE.match(text):
-            return parse_number(field, file, line, "t")
+            return parse_number(text.removesuffix(b" sec"), file, line, "t")
         try:
-            day = "" if b"-" in text[:5] else "2000-01-01T"
-            stamp = datetime.fromisoformat(day + text.decode("ascii"))
+            day_of = "" if b"-" in text[:5] else "2000-01-01T"
+            stamp = datetime.fromisoformat(day_of + text.decode("ascii"))
             self._first = self._first or stamp
             return (stamp - self._first).total_seconds()
         except (ValueError, TypeError) as error:
@@ -120,8 +129,6 @@ def _hint(text: bytes) -> str:
     lower = text.lower().lstrip(b"+-")
     if lower in (b"inf", b"infinity"):
         return "; leave the field empty where a sample was missed"
-    if lower in (b"na", b"n/a", b"null", b"none", b"-"):
-        return "; leave the field empty or write nan where a sample was missed"
     if text.count(b":") == 2:
         return "; write a date as 2026-01-31T12:34:56.789"
     if re.fullmatch(rb"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?", text):
@@ -129,40 +136,15 @@ def _hint(text: bytes) -> str:
     return ""
 
 
-_KNOWN: Mapping[str, Mapping[str, str]] = {
-    "t": {"s": "s", "sec": "s", "seconds": "s", "ms": "ms", "us": "us", "µs": "us", "ns": "ns"},
-    "q": {"rad": "rad", "deg": "deg", "°": "deg", "degrees": "deg", "m": "m", "mm": "mm"},
-    "qd": {"rad/s": "rad", "deg/s": "deg", "°/s": "deg", "rpm": "rpm", "1/min": "rpm", "m/s": "m", "mm/s": "mm"},
-    "qdd": {"rad/s^2": "rad", "rad/s2": "rad", "rad/s²": "rad", "m/s^2": "m", "m/s2": "m", "m/s²": "m"},
-    "tau": {"Nm": "Nm", "N*m": "Nm", "N·m": "Nm", "N m": "Nm", "N": "N", "mNm": "mNm", "A": "A", "mA": "mA"},
-}
-_LIKE: Mapping[str, str] = {"i": "tau", "qref": "q", "qlink": "q", "taucmd": "tau"}
-_FREE = ("temp", "period")  # groups whose units are not looked at
-
-
-def read_units_row(names: Sequence[str], cells: Sequence[str]) -> dict[str, str] | None:
-    """Units by column of CONTRACT.md, as a robot file states them; None where a cell holds no unit of its column."""
-    units: dict[str, str] = {}
-    for name, cell in zip(names, cells, strict=True):
-        group = name.rstrip("0123456789")
-        if group in _FREE:
-            continue
-        root = _LIKE.get(group, group)
-        unit = _KNOWN[root].get(re.sub(r"^[\[({]\s*|\s*[\])}]$", "", cell.strip(' "')))
-        if unit is None:
-            return None
-        key = root if root in ("t", "tau") else name
-        if group not in ("t", "q", "qd", "tau", "i"):
-            continue  # they follow
-        if units.setdefault(key, unit) != unit:
-            return None  # torques in two units
-    return units
-
-
 BLANK = b" "
 
 _SHOWN_BY = (b";", b"\t", b"|")
 _DECIMAL_COMMA = re.compile(rb"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
+# Whole fields with signs between thousands, by whether decimals stand behind a comma.
+_THOUSANDS = {
+    True: re.compile(rb"(?<![^;\t| \n])[+-]?[0-9]{1,3}(?:\.[0-9]{3})+(?=,[0-9]|[;\t| \r\n]|\Z)"),
+    False: re.compile(rb"(?<![^;\t| \n])[+-]?[0-9]{1,3}(?:,[0-9]{3})+(?=\.[0-9])"),
+}
 
 
 @dataclass(frozen=True)
@@ -181,6 +163,8 @@ class Dialect:
         """Whole lines, written with decimal points, without runs of blanks, quotes and brackets."""
         if _has_cells(text):
             return b"\n".join(map(self._open_cells, text.split(b"\n")))
+        if self.delimiter != b",":
+            text = _THOUSANDS[self.has_decimal_comma].sub(_join_thousands, text)
         if self.has_decimal_comma:
             text = text.replace(b",", b".")
         if self.delimiter != BLANK:
@@ -214,16 +198,17 @@ class Dialect:
                 f for line in lines for f in (line.split() if self.delimiter == BLANK else line.split(self.delimiter))
             ]
         commas = any(_DECIMAL_COMMA.fullmatch(field.strip()) for field in fields)
-        return commas and not any(is_number(field) and b"." in field for field in fields)
+        points = (field for field in fields if is_number(field) and b"." in field)
+        return commas and all(_THOUSANDS[True].fullmatch(field.strip()) for field in points)
 
     def _open_cells(self, line: bytes) -> bytes:
         if line.lstrip().startswith(b"#"):
             return line
-        fields = [field for cell in self._cells(line.rstrip(b"\r")) for field in _elements(cell)]
+        fields = [field.encode("latin-1") for cell in self._cells(line.rstrip(b"\r")) for field in _elements(cell)]
+        fields = [_THOUSANDS[self.has_decimal_comma].sub(_join_thousands, field) for field in fields]
         if self.has_decimal_comma:
-            fields = [field.replace(",", ".") for field in fields]
-        sign = self.separator.decode()
-        return self.separator.join(field.replace(sign, " ").encode("latin-1") for field in fields)
+            fields = [field.replace(b",", b".") for field in fields]
+        return self.separator.join(field.replace(self.separator, b" ") for field in fields)
 
     def _cells(self, line: bytes) -> list[str]:
         text, sign = line.decode("latin-1").replace("\r", " "), self.delimiter.decode()
@@ -232,6 +217,10 @@ class Dialect:
         except csv.Error:  # a field of more than 128 KiB
             cells = text.split(sign)
         return [cell for cell in cells if cell] if sign == " " else cells
+
+
+def _join_thousands(number: re.Match[bytes]) -> bytes:
+    return number[0].translate(None, b".,")
 
 
 def _is_list(cell: str) -> bool:
@@ -278,5 +267,6 @@ def find_delimiter(line: bytes) -> bytes:
 
 
 def _is_decimal(field: bytes) -> bool:
-    """Whether a field is a number, its decimals behind a point or a comma."""
-    return is_number(field) or _DECIMAL_COMMA.fullmatch(field.strip(b' \t\r"')) is not None
+    """Whether a field is a number or a date, its decimals behind a point or a comma."""
+    text = field.strip(b' \t\r"')
+    return is_number(text) or any(kind.fullmatch(text) for kind in (_DECIMAL_COMMA, _GERMAN_DATE))

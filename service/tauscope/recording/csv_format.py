@@ -11,10 +11,12 @@ import numpy as np
 from tauscope.errors import RecordingError
 from tauscope.number_text import counted
 from tauscope.recording import csv_dialect
-from tauscope.recording.columns import ColumnLayout, find_layout, require_joint_count
+from tauscope.recording.columns import ColumnLayout, find_layout, order_by_cells, require_joint_count
 from tauscope.recording.intake import Choice, RowIntake, SplitClock
 from tauscope.recording.recording import Array, Recording
+from tauscope.recording.unit_text import collect_units, find_unit, root_of
 from tauscope.recording.units import SI, Reading
+from tauscope.robot.recording_layout import UNITS
 
 _CHUNK_BYTES = 2**18
 _LONGEST_LINE_BYTES = 2**20
@@ -104,13 +106,23 @@ def _read_header(file: BinaryIO, name: str, reading: Reading) -> _Header:
         number = found.line
     else:  # stated units override it
         reading = replace(reading, units={**units, **reading.units})
+        at = file.tell()
+        line = file.readline(_LONGEST_LINE_BYTES)
+        file.seek(at)
+    cells = [_decode(cell) for cell in found.dialect.split(line.strip(b"\r\n"))]
+    layout = order_by_cells(found.names, layout, cells, reading, name)
     return _Header(number, found.dialect, layout, reading, csv_dialect.Clock(), SplitClock())
 
 
 def _find_units(cells: Sequence[bytes], layout: ColumnLayout) -> dict[str, str] | None:
+    """Units of a row below the names, None where it holds anything but units."""
     if len(cells) != layout.width or any(map(csv_dialect.is_number, cells)):
         return None
-    return csv_dialect.read_units_row(layout.names, [_decode(cells[index]) for index in layout.source])
+    asked = {name: index for name, index in zip(layout.names, layout.source, strict=True) if root_of(name) in UNITS}
+    texts = {name: _decode(cells[index]).strip(" []()") for name, index in asked.items()}
+    units = collect_units(texts)
+    is_known = all(find_unit(name, text) for name, text in texts.items())
+    return units if is_known and all(unit in UNITS[root_of(name)] for name, unit in units.items()) else None
 
 
 def _read_names(file: BinaryIO, name: str, reading: Reading) -> _Names:
@@ -265,7 +277,8 @@ def _refuse_units(fields: Sequence[bytes], number: int, header: _Header, name: s
     if any(wanted) and not any(csv_dialect.is_number(field) or field.lower() == b"nan" for field in wanted):
         text = csv_dialect.shown(b",".join(fields).strip())
         raise RecordingError(
-            f"{name}: line {number} looks like a row of units ({text}); delete it or start it with '#'"
+            f"{name}: line {number} looks like a row of units ({text}), not all of which are known; delete it, and "
+            "state those that are not SI by --units"
         )
 
 

@@ -11,11 +11,22 @@ from tauscope.recording.samples import Array, EffortKind
 from tauscope.robot.recording_layout import DELIMITERS, RecordingLayout, find_fault
 from tauscope.robot.robot import JointType, Robot
 
-SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # units of time [s]
+SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}  # units of time [s]
 # Units of angle [rad], and of speed a minute [rad/s].
-RADIANS: Mapping[str, float] = {"rad": 1.0, "deg": np.pi / 180.0, "rpm": 2.0 * np.pi / 60.0}
-METRES: Mapping[str, float] = {"m": 1.0, "mm": 1e-3}  # units of length [m]
-TORQUES: Mapping[str, float] = {"Nm": 1.0, "N": 1.0, "mNm": 1e-3}  # units of torque and force [Nm or N]
+RADIANS: Mapping[str, float] = {
+    "rad": 1.0,
+    "mrad": 1e-3,
+    "deg": np.pi / 180.0,
+    "rev": 2.0 * np.pi,
+    "rpm": 2.0 * np.pi / 60.0,
+}
+METRES: Mapping[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}  # units of length [m]
+_POUND, _FOOT = 4.4482216152605, 0.3048  # force [N] and length [m]
+# Units of torque and force [Nm or N].
+TORQUES: Mapping[str, float] = {
+    **{"Nm": 1.0, "N": 1.0, "mNm": 1e-3, "Ncm": 1e-2, "Nmm": 1e-3, "kNm": 1e3, "kN": 1e3},
+    **{"lbft": _POUND * _FOOT, "lbin": _POUND * _FOOT / 12.0, "ozin": _POUND * _FOOT / 192.0},
+}
 # Units that a joint's torque constant turns into torque [A, or the drive's own unit].
 CURRENTS: Mapping[str, float] = {"A": 1.0, "mA": 1e-3, "drive": 1.0}
 _FOLLOWERS: Mapping[str, tuple[str, ...]] = {"q": ("q", "qref", "qlink"), "qd": ("qd", "qdd"), "tau": ("tau", "taucmd")}

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 # Units that a column may be in, SI first; ``index`` counts samples, ``drive`` is any unit of a drive.
 UNITS: Mapping[str, tuple[str, ...]] = {
-    "t": ("s", "ms", "us", "ns", "index"),
-    "q": ("rad", "deg", "m", "mm"),
-    "qd": ("rad", "deg", "rpm", "m", "mm"),
-    "tau": ("Nm", "N", "mNm", "A", "mA", "drive"),
+    "t": ("s", "ms", "us", "ns", "min", "index"),
+    "q": ("rad", "mrad", "deg", "rev", "m", "cm", "mm"),
+    "qd": ("rad", "mrad", "deg", "rev", "rpm", "m", "cm", "mm"),
+    "tau": ("Nm", "N", "mNm", "Ncm", "Nmm", "kNm", "kN", "lbft", "lbin", "ozin", "A", "mA", "drive"),
 }
 
 PRESETS = ("rtde", "libfranka", "plotjuggler", "lerobot", "mujoco", "isaac")  # names of the layouts that are known

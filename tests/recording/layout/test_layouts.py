@@ -446,3 +446,59 @@ def test_a_rig_with_one_joint(tmp_path: Path) -> None:
         samples = read(path, layout, joints).samples()
         assert np.array_equal(samples.position, Q[:, :1])
         assert np.array_equal(samples.effort, TAU[:, :1])
+
+
+ECHOED = ["elbow", "shoulder_pan", "wrist_1"]  # as ROS sorts joints
+
+
+@pytest.mark.parametrize("has_names", [True, False], ids=["rostopic echo -p", "ros2 topic echo --csv"])
+def test_joints_that_rows_name_are_matched_by_name(tmp_path: Path, has_names: bool) -> None:
+    order = [JOINTS.index(name) for name in ECHOED]
+    stamps = [[int(time), round(time % 1 * 1e9)] for time in TIME]
+    groups = (Q[:, order].tolist(), QD[:, order].tolist(), TAU[:, order].tolist())
+    rows = [[*stamp, "base", *ECHOED, *q, *qd, *tau] for stamp, q, qd, tau in zip(stamps, *groups, strict=True)]
+    fields = [f"field.{name}{k}" for name in ("name", "position", "velocity", "effort") for k in range(3)]
+    names = ["secs", "nsecs", "field.header.frame_id", *fields]
+    lines = [",".join(names)] if has_names else []
+    path = tmp_path / "echo.csv"
+    path.write_text("\n".join([*lines, *(",".join(map(str, row)) for row in rows)]) + "\n")
+    layout = guess_of(message_of(lambda: read(path, RecordingLayout(), JOINTS)))
+    found = rows_of(read(path, layout, JOINTS))
+    np.testing.assert_allclose(found[:, 1:10], np.column_stack([Q, TAU, QD]))
+    message = message_of(lambda: read(path, layout, ("a", "b", "c")))
+    assert "the rows name the joints elbow, shoulder_pan, wrist_1, the robot's are a, b, c" in message
+
+
+@pytest.mark.parametrize(
+    ("better", "worse"),
+    [
+        ("trq_fb_{}", "trq_sp_{}"), ("torque_meas_{}", "torque_ff_{}"), ("tau_meas_{}", "tau_est_{}"),
+        ("Joint Torque J{}", "Motor Torque J{}"), ("torque_sensor_{}", "torque_model_{}"),
+        ("torque_{}_mean", "torque_{}_std"),
+        ("Istmoment A{} [Nm]", "Sollmoment A{} [Nm]"),
+    ],
+)  # fmt: skip
+def test_what_is_measured_goes_before_what_is_not(tmp_path: Path, better: str, worse: str) -> None:
+    header = [
+        "time",
+        *(f"pos_{k}" for k in (1, 2, 3)),
+        *(each.format(k) for each in (worse, better) for k in (1, 2, 3)),
+    ]
+    path = write(tmp_path / "file.csv", header, np.column_stack([TIME, Q, 0.5 * TAU, TAU]))
+    layout = guess_of(message_of(lambda: read(path, RecordingLayout(), JOINTS)))
+    np.testing.assert_array_equal(rows_of(read(path, layout, JOINTS))[:, 4:7], TAU)
+
+
+def test_each_signal_may_have_its_own_time(tmp_path: Path) -> None:
+    header = [name for k in (1, 2, 3) for name in ("Time", f"Axis{k}.ActPos", "Time", f"Axis{k}.ActTorque")]
+    rows = np.column_stack([column for k in range(3) for column in (TIME, Q[:, k], TIME, TAU[:, k])])
+    path = write(tmp_path / "scope.csv", header, rows)
+    layout = guess_of(message_of(lambda: read(path, RecordingLayout(), JOINTS)))
+    np.testing.assert_allclose(rows_of(read(path, layout, JOINTS))[:, 1:], np.column_stack([Q, TAU]))
+
+
+def test_an_index_without_a_name_is_the_time(tmp_path: Path) -> None:
+    header = ["", *(f"q{k}" for k in (1, 2, 3)), *(f"tau{k}" for k in (1, 2, 3))]
+    path = write(tmp_path / "pandas.csv", header, np.column_stack([TIME, Q, TAU]))
+    layout = guess_of(message_of(lambda: read(path, RecordingLayout(), JOINTS)))
+    np.testing.assert_allclose(rows_of(read(path, layout, JOINTS))[:, 1:], np.column_stack([Q, TAU]))

@@ -64,12 +64,12 @@ def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> str | None:
     if np.abs(ratios[known] / typical - 1.0).max() > AGREEMENT or abs(typical - 1.0) < AGREEMENT:
         return None
     joint = int(np.flatnonzero(known)[0])
-    angles, lengths = {key: RADIANS[key] for key in ("rad", "deg")}, METRES
+    angles, lengths = {key: RADIANS[key] for key in ("rad", "deg")}, {key: METRES[key] for key in ("m", "mm")}
     positions = lengths if types[joint] is JointType.PRISMATIC else angles
-    speeds = lengths if types[joint] is JointType.PRISMATIC else RADIANS
+    speeds = lengths if types[joint] is JointType.PRISMATIC else {**angles, "rpm": RADIANS["rpm"]}
     fits = [
         (abs(typical / (SECONDS[t] * speeds[v] / positions[q]) - 1.0), t, q, v)
-        for t in SECONDS
+        for t in ("s", "ms", "us", "ns")
         for q in positions
         for v in speeds
     ]

@@ -10,30 +10,34 @@ def _split(words: str) -> tuple[str, ...]:
 
 
 _WORDS_OF = {
-    "q": "q qpos position positions pos angle angles theta state axis winkel",
+    "q": "q qpos position positions pos angle angles theta state axis winkel istposition istwinkel",
     "qd": "qd dq qdot qvel velocity velocities vel speed speeds omega",
     "qdd": "qdd ddq qacc acceleration accelerations acc",
-    "tau": "tau torque torques effort efforts eff trq moment moments force drehmoment",
-    "i": "i current currents cur curr strom load",
-    "qref": "qref action",
+    "tau": "tau torque torques effort efforts eff trq moment moments force drehmoment istmoment",
+    "i": "i current currents cur curr strom iststrom load",
+    "qref": "qref action sollposition sollwinkel",
     "taucmd": "taucmd ctrl",
     "temp": "temp temperature temperatures",
     "volt": "volt volts voltage voltages",
     "qlink": "qlink",
 }
 _CORES: Mapping[str, str] = {word: group for group, words in _WORDS_OF.items() for word in _split(words)}
-_COMMANDED = _split("target desired des d cmd command commanded ref reference goal setpoint ipo")
+_COMMANDED = _split("target desired des d cmd command commanded ref reference goal setpoint setpt sp soll consigne ipo")
 # Words of quantities that belong to no joint, or are not its measurement.
 _FOREIGN = {
     *_split("tcp ee eef cartesian base tool ext external wrench object pose contact"),
-    *_split("qfrc gravity error bias limit limits max min accelerometer imu"),
+    *_split("qfrc gravity error err bias limit limits max min std stddev var variance accelerometer imu"),
 }
 _QUALIFIERS = _split("present actual measured meas act raw filtered msr computed applied")
 _NO_NAMES = {*_CORES, *_COMMANDED, *_QUALIFIERS}  # they name a quantity or how it came about, and no joint
 # Words that make a family second choice.
-_LEVELS: Mapping[str, int] = {"computed": 1, "force": 2, "theta": 2, "load": 2, "state": 3, "axis": 4}
-_TIMES = _split("t time zeit timestamp stamp sim_time time_s seconds sec clock elapsed duration")  # the likeliest first
-_UNIT = re.compile(r"(?<![A-Za-z])(deg(?:rees?)?|mA|mNm|percent|pct)(?![A-Za-z])|([°%])")
+_LEVELS: Mapping[str, int] = {
+    **{"computed": 1, "motor": 1, "force": 2, "theta": 2, "load": 2, "state": 3, "axis": 4},
+    **dict.fromkeys(_split("ff feedforward est estimated estimate model modelled predicted nominal friction"), 5),
+}
+_TIMES = _split(
+    "t time zeit timestamp zeitstempel stamp sim_time time_s seconds secs sec clock elapsed duration"
+)  # the likeliest first
 
 
 def role_of(words: Sequence[str]) -> tuple[str, int] | None:
@@ -57,22 +61,10 @@ def role_of(words: Sequence[str]) -> tuple[str, int] | None:
 
 def time_rank(words: Sequence[str]) -> int | None:
     """How likely a column is the time; the least is the likeliest, None where it is none."""
-    name = "_".join(word for word in words if word not in ("ms", "us", "ns", "s"))
+    name = "_".join(word for word in words if word not in ("ms", "us", "ns", "s", "min"))
     if name in _TIMES:
         return _TIMES.index(name)
     return next((len(_TIMES) + rank for rank, time in enumerate(_TIMES) if name.endswith(f"_{time}")), None)
-
-
-def time_unit(words: Sequence[str]) -> str | None:
-    """The unit that a name of a time states, None where it states none or seconds."""
-    return next((word for word in words if word in ("ms", "us", "ns")), None)
-
-
-def unit_of(name: str) -> str | None:
-    """The unit that the name of a joint's column states, None where it states none or SI."""
-    match = _UNIT.search(name)
-    word = "" if match is None else match[0]
-    return {"mA": "mA", "mNm": "mNm", "percent": "drive", "pct": "drive", "%": "drive", "": None}.get(word, "deg")
 
 
 # Placeholders of a template: the joint's number from 0, its number from 1, its name.

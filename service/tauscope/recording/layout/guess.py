@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 
-from tauscope.recording.layout.families import Family, find_families, role_of, time_rank, time_unit, unit_of, words_of
+from tauscope.recording.layout.families import Family, find_families, role_of, time_rank, words_of
 from tauscope.recording.layout.presets import PRESET_OF, Preset
 from tauscope.robot.recording_layout import RecordingLayout, Source
 
@@ -58,14 +58,10 @@ def guess_parts(
     groups = {"q": q, "i" if effort == "i" else "tau": _choose(families, effort, count)}
     groups |= {group: _choose(families, group, count) for group in _OPTIONAL if group != effort}
     columns: dict[str, Source] = {} if time is None else {"t": _add_nanoseconds(header, time)}
+    if time is None and header[:1] == [""]:  # the index of a table, as pandas writes it
+        columns = {"t": 1}
     columns |= {group: _source(family, count) for group, family in groups.items() if family is not None}
-    torque = groups.get("i") or groups.get("tau")
-    units = {
-        "t": None if time is None else time_unit(words_of(time)),
-        "q": None if q is None else unit_of(q.template),
-        "tau": None if torque is None else unit_of(torque.template),
-    }
-    return RecordingLayout({column: unit for column, unit in units.items() if unit}, columns=columns)
+    return RecordingLayout(columns=columns)
 
 
 def layout_text(layout: RecordingLayout) -> str:
@@ -96,9 +92,10 @@ def _guess_by_place(width: int, joint_count: int | None) -> RecordingLayout:
             if n > 0 and width == len(groups) * n + 1:
                 places = {group: [2 + k * n + j for j in range(n)] for k, group in enumerate(groups)}
                 return RecordingLayout(columns={"t": 1, **places})
-        if n > 0 and width == 4 * n + 3:  # `ros2 topic echo --csv`: sec, nanosec, frame, names, q, qd, effort
-            places = {group: [4 + k * n + j for j in range(n)] for k, group in enumerate(("q", "qd", "tau"), 1)}
-            return RecordingLayout(columns={"t": [1, 2], **places})
+            # `ros2 topic echo --csv`: sec, nanosec, frame, names, q, qd if there is any, effort
+            if n > 0 and width == (len(groups) + 1) * n + 3:
+                places = {group: [4 + k * n + j for j in range(n)] for k, group in enumerate(groups, 1)}
+                return RecordingLayout(columns={"t": [1, 2], **places})
     return RecordingLayout(columns={})
 
 
@@ -128,7 +125,9 @@ def _find_time(header: Sequence[str], known: Sequence[str] | None) -> str | None
 
 
 def _add_nanoseconds(header: Sequence[str], time: str) -> Source:
-    """The column of the time, with that of its nanoseconds where it counts whole seconds."""
+    """The column of the time, with that of its nanoseconds where it counts whole seconds; the first of several."""
+    if header.count(time) > 1:  # each signal has its own time
+        return header.index(time) + 1
     match = _WHOLE_SECONDS.fullmatch(time)
     names = [f"{match[1]}{name}" for name in ("nanosec", "nsec", "nsecs")] if match else []
     return next(([time, name] for name in names if name in header), time)

@@ -105,6 +105,12 @@ class _Mapping:
     def _find(self, source: Source, target: str) -> int:
         """Index of a column, by its name, or by its number from 1 where no column has that name."""
         name = str(source)
+        places = [str(place) for place, each in enumerate(self._header, 1) if each == name]
+        if len(places) > 1:
+            raise RecordingError(
+                f"{self._file}: columns: {target}: {len(places)} columns are named {printable(name)}; give one by its "
+                f"number, {listed(places)}"
+            )
         if name in self._known:
             return self._known[name]
         if isinstance(source, int) and 0 < source <= len(self._header):

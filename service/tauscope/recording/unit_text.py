@@ -1,0 +1,94 @@
+"""Units as people write them: in the name of a column, and in a row below the names."""
+
+import re
+from collections.abc import Mapping
+
+from tauscope.robot.recording_layout import UNITS
+
+_SPELLINGS: Mapping[str, Mapping[str, str]] = {
+    "t": {
+        "s": "s sec secs second seconds",
+        "ms": "ms msec millisecond milliseconds",
+        "us": "us µs μs usec microsecond microseconds",
+        "ns": "ns nsec nanosecond nanoseconds",
+        "min": "min minute minutes",
+    },
+    "q": {
+        "rad": "rad radian radians",
+        "mrad": "mrad",
+        "deg": "deg degs degree degrees ° º",
+        "rev": "rev revs revolution revolutions turn turns",
+        "m": "m",
+        "mm": "mm",
+        "cm": "cm",
+    },
+    "tau": {
+        "Nm": "nm",
+        "N": "n",
+        "mNm": "mnm",
+        "Ncm": "ncm",
+        "Nmm": "nmm",
+        "kNm": "knm",
+        "kN": "kn",
+        "lbft": "lbft lbfft ftlb ftlbf",
+        "lbin": "lbin lbfin inlb inlbf",
+        "ozin": "ozin ozfin inoz",
+        "A": "a amp amps ampere",
+        "mA": "ma",
+        "drive": "% percent pct ‰ permille promille 01%",
+    },
+}
+_PER_MINUTE = ("rpm", "1/min", "min1", "u/min")
+_LIKE: Mapping[str, str] = {"i": "tau", "qref": "q", "qlink": "q", "taucmd": "tau"}
+_SIGNS = re.compile(r"[\s.*·⋅^_-]")
+_PER_SECOND = re.compile(r"(?:/s(?:ec)?|s1)[2²]?$")
+_BRACKETED = re.compile(r"[\[(]\s*([^\[\](){}]*?)\s*[\])]")
+# Spellings that are a unit wherever they stand; others are only in brackets: `a` and `min`, say.
+_UNMISTAKABLE = re.compile(
+    r"(?<![^\W\d_])(?:[mun]s|deg(?:rees?)?|mrad|turns|rpm|m?nm|ncm|knm|ma|percent|pct|permille)(?![^\W\d_])|[°º%‰]",
+    re.IGNORECASE,
+)
+
+
+def root_of(column: str) -> str:
+    """The group whose unit a column of CONTRACT.md has, or a group of them."""
+    group = column.rstrip("0123456789")
+    return _LIKE.get(group, group)
+
+
+def find_unit(column: str, text: str) -> str | None:
+    """The unit of CONTRACT.md that `text` means for a column, or a group of them; None where it means none."""
+    plain, root = _SIGNS.sub("", text).lower(), root_of(column)
+    if root in ("qd", "qdd"):
+        if plain in _PER_MINUTE:
+            return "rpm"
+        plain, root = "deg" if plain == "dps" else _PER_SECOND.sub("", plain), "q"
+    return next((unit for unit, spelled in _SPELLINGS.get(root, {}).items() if plain in spelled.split()), None)
+
+
+def stated_unit(column: str, name: str) -> str | None:
+    """The unit, or whatever is in its place, that the `name` of a column states; None where it states none.
+
+    That is text in brackets, or a word that cannot mean anything else.
+    """
+    texts = [text for text in _BRACKETED.findall(name) if any(map(str.isalpha, text)) or text in ("°", "%", "‰")]
+    texts += [word for word in _UNMISTAKABLE.findall(name) if find_unit(column, word)]
+    return next(filter(None, (find_unit(column, text) for text in texts)), texts[-1] if texts else None)
+
+
+def collect_units(texts: Mapping[str, str | None]) -> dict[str, str]:
+    """Units by group, or by column where angles and lengths differ. `texts`: what columns of CONTRACT.md state.
+
+    Texts that are no unit, and differ from joint to joint, are names of the joints. All torques have one unit.
+    """
+    units: dict[str, str] = {}
+    for root, known in UNITS.items():
+        own = {name: find_unit(root, text) or text for name, text in texts.items() if text and root_of(name) == root}
+        distinct = list(dict.fromkeys(own.values()))
+        if len(distinct) == 1:
+            units[root] = distinct[0]
+        elif root == "tau" and set(distinct).intersection(known):
+            units[root] = "Nm" if set(distinct) == {"Nm", "N"} else " and ".join(distinct)
+        elif set(distinct).intersection(known):
+            units |= own
+    return units
