@@ -17,6 +17,7 @@ from tauscope.recording import EffortKind, Reading, Recording, flow_text, open_r
 from tauscope.remote_files import find_path
 from tauscope.report.provenance import InputFile, Provenance, input_files, versions
 from tauscope.robot import RecordingLayout, Robot, find_column_fault, find_fault, find_separator_fault
+from tauscope.robot.recording_layout import UNITS
 from tauscope.strict_model import StrictModel
 
 # Name of each input of a request in a report.
@@ -57,8 +58,9 @@ class ReadingOptions(StrictModel):
 
     units: dict[str, str] | None = Field(
         default=None,
-        description="unit of the columns that are not in SI: t (s, ms, us, ns, index), q (rad, deg, m, mm), qd (rad,"
-        " deg, rpm, m, mm), tau (Nm, N, A, mA, drive), or of one joint's column, as q3; null: as the robot file says",
+        description="unit of the columns that are not in SI: "
+        + "; ".join(f"{column} ({', '.join(units)})" for column, units in UNITS.items())
+        + "; or of one joint's column, as q3; null: as the robot file and the columns' names say",
         examples=[{"q": "deg", "t": "ms"}],
     )
     rate_hz: float | None = Field(
