@@ -44,7 +44,7 @@ def test_every_verb_takes_a_mapping(
     refused = run("identify", files.robot, foreign)
     assert refused.status == 1
     (line,) = refused.err.splitlines()
-    assert line.endswith("`tauscope recording map` maps columns of other names")
+    assert "give --columns FILE.yaml with a name for each ?" in line
     errors = []
     for words in (("--columns", mapping), ("--columns", flow_text(COLUMNS), "--units", "q=deg")):
         ended = run("identify", files.robot, foreign, *words, "--json", "-")

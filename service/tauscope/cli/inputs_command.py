@@ -17,9 +17,9 @@ from tauscope.cli.terminal import output, say, show_progress, table
 from tauscope.cli.verbs import make_group, make_request
 from tauscope.number_text import ABSENT, counted, given, significant
 from tauscope.recording import EffortKind, Reading, RecordingReport, check_recording, convert_recording
-from tauscope.recording.columns import map_columns
 from tauscope.recording.convert import FORMATS
 from tauscope.recording.layout.guess import guess_parts, layout_text
+from tauscope.recording.mapping import map_columns
 from tauscope.recording.reading import read_header
 from tauscope.report.tables import Table
 from tauscope.robot import JointSummary, RecordingLayout, layout_from_dict, read_robot

@@ -16,9 +16,10 @@ import numpy as np
 
 from tauscope.errors import RecordingError
 from tauscope.extras import require_extra
-from tauscope.recording.columns import ColumnLayout, find_layout, require_joint_count
+from tauscope.recording.columns import ColumnLayout, require_joint_count
 from tauscope.recording.inflation import HELD_BYTES, require_plausible_inflation
 from tauscope.recording.intake import Choice, EpisodeClock, RowIntake, SplitClock
+from tauscope.recording.mapping import find_layout
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.units import SECONDS
 from tauscope.robot.messages import listed, printable, reason

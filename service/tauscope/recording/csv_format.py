@@ -11,8 +11,9 @@ import numpy as np
 from tauscope.errors import RecordingError
 from tauscope.number_text import counted
 from tauscope.recording import csv_dialect
-from tauscope.recording.columns import ColumnLayout, find_layout, order_by_cells, require_joint_count
+from tauscope.recording.columns import ColumnLayout, require_joint_count
 from tauscope.recording.intake import Choice, RowIntake, SplitClock
+from tauscope.recording.mapping import find_layout, order_by_cells
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.unit_text import collect_units, find_unit, root_of
 from tauscope.recording.units import SI, Reading

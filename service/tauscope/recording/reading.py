@@ -9,12 +9,13 @@ from pydantic import Field
 
 from tauscope.errors import RecordingError
 from tauscope.recording import column_files
-from tauscope.recording.columns import find_layout, is_column, require_joint_count, suggest_layout
+from tauscope.recording.columns import is_column, require_joint_count
 from tauscope.recording.csv_format import read_csv, read_csv_header
 from tauscope.recording.intake import Choice
 from tauscope.recording.joint_state_topic import JointStateLog
 from tauscope.recording.layout.guess import guess_parts
 from tauscope.recording.layout.rename import rename_columns
+from tauscope.recording.mapping import find_layout, suggest_layout
 from tauscope.recording.mcap_format import MCAP_MAGIC, add_mcap
 from tauscope.recording.recording import Recording
 from tauscope.recording.ros_bags import ROS1_MAGIC, SQLITE_MAGIC, add_database, add_ros1_bag, add_rosbag2

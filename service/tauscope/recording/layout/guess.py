@@ -92,6 +92,9 @@ def _guess_by_place(width: int, joint_count: int | None) -> RecordingLayout:
             if n > 0 and width == len(groups) * n + 1:
                 places = {group: [2 + k * n + j for j in range(n)] for k, group in enumerate(groups)}
                 return RecordingLayout(columns={"t": 1, **places})
+            if n > 0 and width == len(groups) * n:  # without time
+                places = {group: [1 + k * n + j for j in range(n)] for k, group in enumerate(groups)}
+                return RecordingLayout(columns=places)
             # `ros2 topic echo --csv`: sec, nanosec, frame, names, q, qd if there is any, effort
             if n > 0 and width == (len(groups) + 1) * n + 3:
                 places = {group: [4 + k * n + j for j in range(n)] for k, group in enumerate(groups, 1)}

@@ -1,0 +1,171 @@
+"""How a file's columns are found: by its mapping, a preset or their own names; and what to give where they are not."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+from tauscope.errors import RecordingError, RecordingMismatchError
+from tauscope.recording.columns import ColumnLayout, find_columns
+from tauscope.recording.csv_dialect import is_number
+from tauscope.recording.layout.families import BY_NAME, role_of, words_of
+from tauscope.recording.layout.guess import guess_layout, guess_parts, is_numbered, layout_text
+from tauscope.recording.layout.presets import PRESET_OF
+from tauscope.recording.layout.rename import rename_columns
+from tauscope.recording.unit_text import collect_units, root_of, stated_unit
+from tauscope.recording.units import Reading
+from tauscope.result_warning import ResultWarning
+from tauscope.robot.messages import listed, printable
+from tauscope.robot.recording_layout import UNITS, RecordingLayout
+
+
+def find_layout(header: Sequence[str], reading: Reading, file: str) -> tuple[Reading, ColumnLayout]:
+    """How a file is read, and which of its columns is which. Raises RecordingError as `map_columns`."""
+    if reading.is_usual and _is_ours(header):  # Tauscope made it, and the robot file describes those of another tool
+        try:
+            rename_columns(header, reading, file)
+        except RecordingError:
+            reading = replace(reading, columns=None, units={}, rate_hz=None)
+    layout = map_columns(header, reading, file)
+    return replace(reading, units={**units_of_names(header, layout, reading, file), **reading.units}), layout
+
+
+def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLayout:
+    """Columns of CONTRACT.md in a file's header, by its mapping, its preset or their own names.
+
+    Raises RecordingError, which holds the mapping that the header suggests; RecordingMismatchError for other joints.
+    """
+    renamed = rename_columns(header, reading, file)
+    counts_rows = reading.units.get("t") == "index" and "t" not in renamed
+    try:
+        layout = find_columns(["t", *renamed] if counts_rows else renamed, file, counts_rows=counts_rows)
+        return replace(layout, notes=_note_command(header, renamed))
+    except RecordingError as error:
+        if reading.columns is not None or isinstance(error, RecordingMismatchError):
+            raise
+        guess = suggest_layout(header, reading, file)
+        if guess is None:
+            if _is_ours(header):
+                raise
+            _require_known_names(header, reading, file)
+            raise RecordingError(f"{error}; {_say_parts(header, reading)}") from error
+        raise RecordingError(f"{_say_what_fails(error, header, file)}; {_say_guess(guess, header, reading)}") from error
+
+
+def _note_command(header: Sequence[str], renamed: Sequence[str]) -> tuple[ResultWarning, ...]:
+    column = next((name for name, target in zip(header, renamed, strict=True) if target == "tau1"), "tau1")
+    role = None if column == "tau1" else role_of(words_of(column))
+    if role is None or role[0] != "taucmd":
+        return ()
+    text = f"column {printable(column)}: this effort is commanded, not measured; it holds the controller's own model"
+    remedy = "record measured torques or currents, and state torque_constant for currents"
+    return (ResultWarning(code="commanded-effort", text=text, remedy=remedy),)
+
+
+def units_of_names(header: Sequence[str], layout: ColumnLayout, reading: Reading, file: str) -> dict[str, str]:
+    """Units that the names of columns state, where nobody else states them. Raises RecordingError for unknown ones."""
+    names = {name: header[index] for name, index in zip(layout.names, layout.source, strict=True)}
+    asked = {name for name in names if not {name, root_of(name)}.intersection(reading.units)}
+    texts = {name: stated_unit(name, text) for name, text in names.items() if name in asked}
+    units = collect_units({name: text for name, text in texts.items() if text not in (reading.joint_names or ())})
+    for target, unit in units.items():
+        known = UNITS[root_of(target)]
+        if unit not in known:
+            column = next(name for column, name in names.items() if target in (column, root_of(column)))
+            raise RecordingError(
+                f"{file}: column {printable(column)}: {printable(unit)} is no unit that is known; state it by --units "
+                f"{target}=UNIT, of {', '.join(known)}, or convert the column"
+            )
+    return units
+
+
+def order_by_cells(
+    header: Sequence[str], layout: ColumnLayout, cells: Sequence[str], reading: Reading, file: str
+) -> ColumnLayout:
+    """The same with each joint's columns in the place of its name, where a file names the joints in its rows.
+
+    So do logs of ROS messages as text: ``name0, name1, …, position0, …``. `cells`: of the first row. Raises
+    RecordingMismatchError where these name other joints.
+    """
+    robot = reading.joint_names or ()
+    is_by_place = reading.columns is not None and BY_NAME not in str(reading.columns)
+    if len(robot) < 2 or not is_by_place:
+        return layout
+    named = [cell for name, cell in zip(header, cells, strict=False) if "name" in words_of(name)]
+    if is_numbered(header):  # the texts before the numbers, of which a frame may be the first
+        named = [cell for cell in cells if not is_number(cell.encode()) and cell][-len(robot) :]
+    if len(named) != len(robot):
+        return layout
+    if set(named) != set(robot):
+        raise RecordingMismatchError(
+            f"{file}: the rows name the joints {listed(named)}, the robot's are {listed(robot)}; name the robot's "
+            "joints as the recording does"
+        )
+    where = dict(zip(layout.names, layout.source, strict=True))
+    moved = {}
+    for group in {name.rstrip("0123456789") for name in layout.names}:
+        columns = sorted(index for name, index in where.items() if name.rstrip("0123456789") == group)
+        if len(columns) == len(robot):
+            moved |= {f"{group}{joint}": columns[named.index(name)] for joint, name in enumerate(robot, 1)}
+    return replace(layout, source=tuple((where | moved)[name] for name in layout.names))
+
+
+def suggest_layout(header: Sequence[str], reading: Reading, file: str) -> RecordingLayout | None:
+    """The mapping that the header suggests, None where a file with it would be refused again."""
+    guess = guess_layout(header, reading.joint_names, prefers_torque=reading.prefers_torque)
+    if guess is None:
+        return None
+    units = _units_of_tool(header, reading, guess)
+    try:
+        layout = find_columns(rename_columns(header, replace(reading, columns=guess.columns), file), file)
+    except RecordingError:
+        return None
+    with suppress(RecordingError):  # who reads the file so is told of units that are not known
+        units = {**units, **units_of_names(header, layout, replace(reading, units=units), file)}
+    return replace(guess, units=units)
+
+
+def _units_of_tool(header: Sequence[str], reading: Reading, guess: RecordingLayout) -> Mapping[str, str]:
+    """Units of the preset that reads the same columns, such as LeRobot's degrees."""
+    for name, preset in PRESET_OF.items():
+        if preset.units:
+            layout = guess_layout(header, reading.joint_names, preset=name, prefers_torque=reading.prefers_torque)
+            if layout is not None and layout.columns == guess.columns:
+                return preset.units
+    return {}
+
+
+def _require_known_names(header: Sequence[str], reading: Reading, file: str) -> None:
+    """Refuse columns that name other joints than the robot's: the message lists both."""
+    named = guess_layout(header) if reading.joint_names is not None else None
+    if named is not None and isinstance(named.columns, Mapping) and BY_NAME in str(named.columns["q"]):
+        rename_columns(header, replace(reading, columns=named.columns), file)
+
+
+def _is_ours(header: Sequence[str]) -> bool:
+    """Whether columns have the names of CONTRACT.md, so that no mapping is missing."""
+    return "t" in header and "q1" in header
+
+
+def _say_what_fails(error: RecordingError, header: Sequence[str], file: str) -> str:
+    if is_numbered(header):
+        return f"{file}: the first row holds numbers where the column names are expected"
+    return str(error)
+
+
+def _say_guess(guess: RecordingLayout, header: Sequence[str], reading: Reading) -> str:
+    """What to give where a header suggests all columns, and what it takes for granted."""
+    layout = layout_text(replace(guess, decimal=reading.decimal, delimiter=reading.delimiter))
+    condition = "this maps them"
+    if not is_numbered(header) and isinstance(guess.columns, Mapping) and isinstance(guess.columns["q"], list):
+        condition = f"the first {len(guess.columns['q'])} joints are the robot's"
+    return f"if {condition}, give it as --columns FILE.yaml: {layout}"
+
+
+def _say_parts(header: Sequence[str], reading: Reading) -> str:
+    """What to give where it suggests some: a mapping with ``?`` for the others."""
+    found = guess_parts(header, reading.joint_names).columns
+    parts = dict(found) if isinstance(found, Mapping) else {}
+    lacks = {"t": "?", "q": "?{1}"} | ({} if {"i", "qref"} & set(parts) else {"tau": "?{1}"})
+    layout = layout_text(RecordingLayout(columns=lacks | parts))
+    timeless = " (without t, and with --units t=index --rate HZ, where no column is the time)"
+    return f"give --columns FILE.yaml with a name for each ?{'' if 't' in parts else timeless}: {layout}"
