@@ -146,6 +146,10 @@ BAD = {
     "joint zero": (changed(1, "t,q0,q1,tau0,tau1"), "column q0 belongs to no joint: joints are numbered from 1"),
     "twice": (changed(1, "t,q1,q1,tau1,tau2"), "column q1 appears twice (as columns 2 and 3)"),
     "foreign joint": (changed(1, "t,q1,qd2,tau1,x"), "column qd2 belongs to no joint: the positions are q1 to q1"),
+    "header again": (
+        changed(17, LINES[0]),
+        "line 17, column q1: 'q1' is not a number; is this the header again? split",
+    ),
     "text": (field_changed(17, "tau2", "abc"), "line 17, column tau2: 'abc' is not a number"),
     "hexadecimal": (field_changed(17, "tau2", "0x1A"), "line 17, column tau2: '0x1A' is not a number"),
     "underscore": (field_changed(17, "tau2", "1_000"), "line 17, column tau2: '1_000' is not a number"),
@@ -210,6 +214,15 @@ def test_times_of_other_programs_are_seconds(tmp_path: Path, stamp: Callable[[fl
     rows = rows_of(read(tmp_path, "\n".join([LINES[0], *lines])))
     np.testing.assert_allclose(rows[:, 0] - rows[0, 0], ROWS[:, 0], atol=2e-6)
     np.testing.assert_array_equal(rows[:, 1:], ROWS[:, 1:])
+
+
+def test_times_of_day_go_on_after_midnight(tmp_path: Path) -> None:
+    times = [
+        f"{'23:59:59' if time < 0.08 else '00:00:00'}.{round(1e3 * (time + 0.92) % 1e3):03d}" for time in ROWS[:, 0]
+    ]
+    lines = [",".join([time, *line.split(",")[1:]]) for time, line in zip(times, LINES[1:], strict=True)]
+    rows = rows_of(read(tmp_path, "\n".join([LINES[0], *lines])))
+    np.testing.assert_allclose(rows[:, 0], ROWS[:, 0], atol=1e-9)
 
 
 def test_a_german_table_keeps_its_semicolons_beside_commas_in_dates(tmp_path: Path) -> None:

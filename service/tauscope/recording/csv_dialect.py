@@ -10,7 +10,7 @@ import re
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import datetime, timedelta
 
 import numpy as np
 from pydantic_core import from_json
@@ -79,7 +79,8 @@ def parse_number(field: bytes, file: str, line: int, column: str) -> float:
     if not text or _MISSED.fullmatch(text):
         return np.nan
     if not is_number(text):
-        raise RecordingError(f"{file}: line {line}, column {column}: {shown(text)} is not a number{_hint(text)}")
+        again = "; is this the header again? split the file there" if text == column.encode() else _hint(text)
+        raise RecordingError(f"{file}: line {line}, column {column}: {shown(text)} is not a number{again}")
     value = float(text)
     if np.isinf(value):
         raise RecordingError(f"{file}: line {line}, column {column}: {shown(text)} is too large for a number")
@@ -91,6 +92,8 @@ class Clock:
 
     def __init__(self) -> None:
         self._first: datetime | None = None
+        self._last: datetime | None = None
+        self._midnights = timedelta()
 
     def parse(self, field: bytes, file: str, line: int) -> float:
         """Time of a row, in the file's own unit. Raises RecordingError where it is neither a number nor a date."""
@@ -104,10 +107,12 @@ class Clock:
         if not _DATE.match(text):
             return parse_number(text.removesuffix(b" sec"), file, line, "t")
         try:
-            day_of = "" if b"-" in text[:5] else "2000-01-01T"
-            stamp = datetime.fromisoformat(day_of + text.decode("ascii"))
-            self._first = self._first or stamp
-            return (stamp - self._first).total_seconds()
+            has_day = b"-" in text[:5]
+            stamp = datetime.fromisoformat(("" if has_day else "2000-01-01T") + text.decode("ascii"))
+            if not has_day and self._last is not None and stamp < self._last - timedelta(hours=12):
+                self._midnights += timedelta(days=1)
+            self._first, self._last = self._first or stamp, stamp
+            return (stamp + self._midnights - self._first).total_seconds()
         except (ValueError, TypeError) as error:
             reason = "has a time zone in some rows only" if isinstance(error, TypeError) else "is no date of ISO 8601"
             raise RecordingError(f"{file}: line {line}, column t: {shown(text)} {reason}") from error
