@@ -63,12 +63,10 @@ class Finding:
 
     @property
     def explained(self) -> Array:
-        """Squares that they take off the residuals of these joints, training and held-out, in what is left, (n,)."""
-        taken = self.before.train**2 - self.after.train**2
-        if self.before.held_out is not None and self.after.held_out is not None:
-            taken = taken + self.before.held_out**2 - self.after.held_out**2
-        left = np.maximum(self.after.train**2, np.finfo(float).tiny)
-        return np.where(self.is_touched, np.maximum(taken / left, 0.0), 0.0)
+        """Squares that they take off the residuals of these joints, (n,), in what is left of training and held-out."""
+        pairs = [(self.before.train, self.after.train), (self.before.held_out, self.after.held_out)]
+        taken = [_relative_squares(b, a) - 1.0 for b, a in pairs if b is not None and a is not None]
+        return np.where(self.is_touched, np.maximum(np.sum(taken, axis=0), 0.0), 0.0)
 
     @property
     def place(self) -> Place:
@@ -81,6 +79,10 @@ class Finding:
         if self.before.stretches is None or self.after.stretches is None:
             return None
         return HeldOutChange.between(self.before.stretches, self.after.stretches)
+
+
+def _relative_squares(before: Array, after: Array) -> Array:
+    return np.square(before / np.maximum(after, 1e-9 * before + np.finfo(float).tiny))
 
 
 def in_order(found: Sequence[Finding]) -> tuple[Finding, ...]:
