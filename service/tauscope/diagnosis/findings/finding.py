@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tauscope.diagnosis.model.extended import ExtendedModel
 from tauscope.diagnosis.model.held_out_change import HeldOutChange, sum_stretches
@@ -56,7 +57,7 @@ class Finding:
     formula: Effect | None = None  # the law whose error may be all that this one explains (`formula_error`)
 
     @property
-    def is_touched(self) -> Array:
+    def is_touched(self) -> NDArray[np.bool_]:
         """Whether they change a joint's torque, (n,)."""
         count = len(self.after.train)
         return np.isin(np.arange(count), self.terms[0].effect.touched(count))
