@@ -17,8 +17,9 @@ from tauscope.recording.recording import Array
 
 # Log odds within which data do not tell two effects apart: a small error of the columns decides between them.
 EQUIVALENT = 5.0
-# Part of an effect's energy or log odds that counts as nothing between two laws: no formula is exactly that of an arm.
-FORMULA_ERROR = 0.05
+# Part of an effect's energy or log odds that counts as nothing between two laws: no formula is exactly that of an arm,
+# but errs by a fifth of its amplitude (one standard deviation).
+FORMULA_ERROR = 0.2**2
 
 
 @dataclass(frozen=True, eq=False)
