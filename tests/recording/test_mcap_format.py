@@ -187,6 +187,20 @@ def test_joints_that_change_order_from_message_to_message(tmp_path):
     assert np.array_equal(recording.samples().position, MOTION["position"])
 
 
+@pytest.mark.parametrize("offset", [0.02, 0.5])
+def test_a_second_publisher_of_all_joints_is_left_out(tmp_path, offset):
+    smooth = np.sin(np.arange(400)[:, None] * [0.01, 0.013])
+    log = []
+    for k, (position, effort) in enumerate(zip(smooth, np.cos(3.0 * smooth), strict=True)):
+        log.append((4_000_000 * k, joint_state(4_000_000 * k, position, effort, (), ["lift", "elbow"])))
+        late = 4_000_000 * k + 2_000_000
+        log.append((late, joint_state(late, position[::-1] + offset, 0.9 * effort[::-1], (), ["elbow", "lift"])))
+    recording = read_recording(log_file(tmp_path, {"/joint_states": log}))
+    assert np.array_equal(recording.samples().position, smooth)
+    (note,) = recording.notes
+    assert "400 messages hold another state of the same joints; left out" in note.text
+
+
 def test_one_of_several_topics(tmp_path):
     other = messages(50)
     both = {"/arm/joint_states": other, "/joint_states": messages()}

@@ -1,14 +1,13 @@
 """From the topics of a log to a recording: which topic is meant, which joints, which clock."""
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeAlias, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.errors import RecordingError, RecordingMismatchError
+from tauscope.errors import RecordingError
 from tauscope.recording.columns import table_columns
 from tauscope.recording.inflation import (
     HELD_BYTES,
@@ -20,63 +19,16 @@ from tauscope.recording.intake import Choice, RowIntake
 from tauscope.recording.joint_parts import JointParts, merge_parts
 from tauscope.recording.joint_state import JointState, JointStateLayout, JointStates, decode_cdr
 from tauscope.recording.joint_state_decoders import Decoder, find_decoder
+from tauscope.recording.publishers import Batch, OtherPublishers, Rows
 from tauscope.recording.recording import EffortKind, Recording
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.messages import listed, reason
-
-_REMEDY = "record with one publisher on the topic, or choose another topic with --topic"
-
-
-class OtherPublishers:
-    """Counts a topic's messages of others, by what they lack, and their names; "" where they lack joints."""
-
-    def __init__(self) -> None:
-        self._counts: Counter[tuple[str, tuple[str, ...]]] = Counter()
-
-    def add(self, names: Sequence[str], missing: str, count: int) -> None:
-        """Messages without joints that are wanted (""), without positions, or without efforts."""
-        self._counts[missing, tuple(names)] += count
-
-    def notes(self, topic: str, wanted: Sequence[str]) -> tuple[ResultWarning, ...]:
-        """Warnings about messages that name wanted joints; a gripper's own messages are none of the arm's business."""
-        texts = [
-            f"{_messages(count)} {f'no {missing}' if missing else f'only the joints {listed(names)}'}; left out"
-            for (missing, names), count in sorted(self._counts.items(), key=lambda entry: not entry[0][0])
-            if (missing and not names) or set(names) & set(wanted)
-        ]
-        return tuple(
-            ResultWarning(code="other-publisher", text=f"topic {topic}: {text}", remedy=_REMEDY) for text in texts
-        )
-
-    def error(self, place: str, wanted: Sequence[str] | None) -> RecordingError:
-        """The reason why no message was of use."""
-        for missing, _ in self._counts:
-            if missing:
-                return RecordingError(f"{place}: carries no {missing}; record position and effort of every joint")
-        known = wanted or ()
-        partial = dict.fromkeys(name for _, names in self._counts if set(names) & set(known) for name in names)
-        found = tuple(partial) or max(self._counts, key=lambda entry: self._counts[entry], default=("", ()))[1]
-        missed = [name for name in known if name not in found]
-        verb = "is" if len(missed) == 1 else "are"
-        lacks = f": {listed(missed)} {verb} missing; record them too, or" if partial else ";"
-        return RecordingMismatchError(
-            f"{place} carries {len(found)} joints ({listed(found)}), the robot has {len(known)} ({listed(known)})"
-            f"{lacks} name the joints in the robot file as the recording does"
-        )
-
-
-def _messages(count: int) -> str:
-    return "1 message holds" if count == 1 else f"{count} messages hold"
-
 
 _MESSAGES_AT_ONCE = 4096
 _BYTES_AT_ONCE = 2**24
 
 LONGEST_FROM_ZERO_NS = 10**12  # a stamp of zero beside stamps above this is none [ns]; simulated time may begin at zero
 Decoded = TypeVar("Decoded")
-Rows: TypeAlias = NDArray[np.intp]
-# Messages of one layout, and their places among those that were taken at once.
-Batch: TypeAlias = tuple[Rows, JointStates]
 
 
 class JointStateTopic:
@@ -128,11 +80,14 @@ class JointStateTopic:
                 require_plausible_inflation(self._choice.packed_bytes, self._unpacked_bytes, name, HELD_BYTES)
             batches = sorted(self._decode(messages, first), key=lambda batch: batch[0][0])
             own: list[Batch] = []
+            orders: list[tuple[str, ...]] = []
             for at, states in batches:
                 if self._is_own(states, first + at[0]):
                     own.append((at, self._arrange(states)))
+                    orders.append(states.names)
                 elif self.parts is not None:
                     self.parts.add(states, log_time[at], self._wanted or ())
+            own = self._others.leave_out(own, orders)
             if own:
                 rows, states = _merge(own)
                 self._take(states, log_time[rows], first + rows)
