@@ -28,7 +28,7 @@ def test_whether_a_torque_constant_is_stated_is_kept(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("block", "words"),
     [
-        ("{units: {t: min}}", "'min' is no unit of t; use s, ms, us, ns, index"),
+        ("{units: {t: h}}", "'h' is no unit of t; use s, ms, us, ns, min, index"),
         ("{units: {x: deg}}", "'x' has no unit to choose; name t, q, qd or tau, or one joint's column, as in q3"),
         ("{units: {tau2: mA}}", "'tau2' has no unit to choose"),
         ("{units: {t: index}}", "t counts samples: state their rate, too"),
