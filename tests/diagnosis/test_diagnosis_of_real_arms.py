@@ -88,7 +88,6 @@ def test_load_dependent_friction_of_the_double_pendulum_is_named() -> None:
 
 
 @pytest.mark.proof
-@pytest.mark.xfail(strict=True, reason="with it the shoulder is predicted 35 % better, and the elbow 15 % worse")
 def test_load_dependent_friction_of_the_double_pendulum_is_named_at_its_shoulder() -> None:
     assert ("load_dependent_friction", "shoulder") in {
         (each.effect, each.joint) for each in told("double-pendulum").findings

@@ -51,6 +51,9 @@ class Deflection(Effect):
     def touched(self, joint_count: int) -> tuple[int, ...]:
         return tuple(range(joint_count))
 
+    def ruled(self, joint_count: int) -> tuple[int, ...]:
+        return (self.joint or 0,)
+
     def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:
         """The size of the deflection, its standard error with that of the first order."""
         found = super().quantities(context, coefficients, shape, covariance)

@@ -89,7 +89,7 @@ class Exchange:
         gained = gates.compare(at, found, touched)
         gained += gates.prior_odds(rival, 0.0) - gates.prior_odds(own, 0.0) - (CATALOGUED if rival is own else 0.0)
         told = 0.0 if gates.held_out is None else gates.held_out.trained_change(at, found).log_odds(sorted(touched))
-        return found, gained if told >= 0.0 else min(gained, 0.0)
+        return found, gained if gained + told > 0.0 else min(gained, 0.0)
 
     def _weigh(self, at: Hypothesis, places: tuple[int, ...], known: Collection[Place] | None = None) -> Weighed:
         """An effect's odds against none and against others in its place: all, or those that are known to compete."""
