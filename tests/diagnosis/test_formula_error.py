@@ -22,7 +22,7 @@ SITES = 40
 shares = st.floats(1e-6, 100.0)
 
 
-def explaining(effect: Effect, energy: float, probability: float = 0.99) -> Finding:
+def make_finding(effect: Effect, energy: float, probability: float = 0.99) -> Finding:
     """A finding that takes so much off the residual of each joint that it touches, relative to what is left."""
     before = [1.0] * JOINTS
     for joint in effect.touched(JOINTS):
@@ -30,15 +30,15 @@ def explaining(effect: Effect, energy: float, probability: float = 0.99) -> Find
     return finding(effect, [0.1] * len(effect.coefficients), effect.grid[0], before=before, probability=probability)
 
 
-def doubted(own: Finding, *others: Finding) -> Finding:
+def doubt(own: Finding, *others: Finding) -> Finding:
     """What becomes of the first."""
     return doubt_formulas([own, *others], SITES)[0]
 
 
 @given(shares)
 def test_the_odds_of_an_error_are_its_chance_times_the_number_of_effects(share: float) -> None:
-    own = explaining(form(JointSpring), share)
-    found = doubted(own, explaining(form(CableForce), 1.0))
+    own = make_finding(form(JointSpring), share)
+    found = doubt(own, make_finding(form(CableForce), 1.0))
     standard_deviations = math.sqrt(share / FORMULA_ERROR)
     odds = 1.0 / found.probability - 1.0 / own.probability
     assert odds == pytest.approx(SITES * math.erfc(standard_deviations / math.sqrt(2.0)), abs=0.008, rel=1e-6)
@@ -46,9 +46,9 @@ def test_the_odds_of_an_error_are_its_chance_times_the_number_of_effects(share: 
 
 @given(shares, shares)
 def test_what_explains_more_is_more_probable(first: float, second: float) -> None:
-    law = explaining(form(CableForce), 1.0)
+    law = make_finding(form(CableForce), 1.0)
     less, more = sorted([first, second])
-    found = [doubted(explaining(form(JointSpring), share), law).probability for share in (less, more)]
+    found = [doubt(make_finding(form(JointSpring), share), law).probability for share in (less, more)]
     assert found[0] <= found[1] <= 0.99
 
 
@@ -58,18 +58,18 @@ def test_what_explains_more_is_more_probable(first: float, second: float) -> Non
     ids=["at another joint", "whose formula is exact"],
 )
 def test_no_other_formula_is_doubted(other: Effect) -> None:
-    assert doubted(explaining(form(JointSpring), 0.01), explaining(other, 1.0)).probability == 0.99
+    assert doubt(make_finding(form(JointSpring), 0.01), make_finding(other, 1.0)).probability == 0.99
 
 
 def test_an_effect_of_the_whole_arm_is_held_against_the_laws_of_all_joints() -> None:
-    tilt = explaining(form(BaseTilt, None), 0.2)
-    assert doubted(tilt, explaining(form(CableForce), 1.0)).formula is None
-    laws = [explaining(form(CableForce, joint), 1.0) for joint in range(JOINTS)]
-    assert doubted(tilt, *laws).probability < 0.5
+    tilt = make_finding(form(BaseTilt, None), 0.2)
+    assert doubt(tilt, make_finding(form(CableForce), 1.0)).formula is None
+    laws = [make_finding(form(CableForce, joint), 1.0) for joint in range(JOINTS)]
+    assert doubt(tilt, *laws).probability < 0.5
 
 
 def test_the_headline_names_the_formula_beside_the_probability() -> None:
-    own = doubted(explaining(form(JointSpring), 0.0), explaining(form(CableForce), 1.0))
+    own = doubt(make_finding(form(JointSpring), 0.0), make_finding(form(CableForce), 1.0))
     quantities = own.terms[0].effect.quantities(
         context(), own.terms[0].coefficients, own.terms[0].shape, own.covariances[0]
     )

@@ -255,6 +255,12 @@ def test_whole_thousands_beside_decimal_commas_are_whole(tmp_path: Path) -> None
     assert set(found[:, 3]) == {1243.0}
 
 
+def test_a_point_behind_a_zero_is_no_sign_between_thousands(tmp_path: Path) -> None:
+    lines = [f"{row[0]!r};0,5;0,5;#;2".replace(".", ",").replace("#", "0.697") for row in ROWS.tolist()]
+    message = message_of(lambda: read(tmp_path, "\n".join([LINES[0].replace(",", ";"), *lines])))
+    assert "is not a number; write decimals with a point" in message
+
+
 def test_a_column_that_nobody_reads_may_have_any_name_twice(tmp_path: Path) -> None:
     lines = [LINES[0] + ",note,note", *(line + ",1,2" for line in LINES[1:])]
     np.testing.assert_array_equal(rows_of(read(tmp_path, "\n".join(lines))), ROWS)

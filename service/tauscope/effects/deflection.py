@@ -51,7 +51,7 @@ class Deflection(Effect):
     def touched(self, joint_count: int) -> tuple[int, ...]:
         return tuple(range(joint_count))
 
-    def ruled(self, joint_count: int) -> tuple[int, ...]:
+    def find_own_joints(self, joint_count: int) -> tuple[int, ...]:
         return (self.joint or 0,)
 
     def quantities(self, context: ArmContext, coefficients: Array, shape: Array, covariance: Array) -> Quantities:

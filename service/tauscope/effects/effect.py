@@ -185,7 +185,7 @@ class Effect(ABC):
         """Joints whose torque the effect changes: its own one, or all."""
         return tuple(range(joint_count)) if self.joint is None else (self.joint,)
 
-    def ruled(self, joint_count: int) -> tuple[int, ...]:
+    def find_own_joints(self, joint_count: int) -> tuple[int, ...]:
         """Joints at which its formula holds: what reaches others through the links follows from mechanics."""
         return self.touched(joint_count)
 

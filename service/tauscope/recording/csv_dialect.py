@@ -147,8 +147,8 @@ _SHOWN_BY = (b";", b"\t", b"|")
 _DECIMAL_COMMA = re.compile(rb"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 # Whole fields with signs between thousands, by whether decimals stand behind a comma.
 _THOUSANDS = {
-    True: re.compile(rb"(?<![^;\t| \n])[+-]?[0-9]{1,3}(?:\.[0-9]{3})+(?=,[0-9]|[;\t| \r\n]|\Z)"),
-    False: re.compile(rb"(?<![^;\t| \n])[+-]?[0-9]{1,3}(?:,[0-9]{3})+(?=\.[0-9])"),
+    True: re.compile(rb"(?<![^;\t| \n])[+-]?[1-9][0-9]{0,2}(?:\.[0-9]{3})+(?=,[0-9]|[;\t| \r\n]|\Z)"),
+    False: re.compile(rb"(?<![^;\t| \n])[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+(?=\.[0-9])"),
 }
 
 

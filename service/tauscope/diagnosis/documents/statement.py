@@ -100,9 +100,10 @@ def _noun(rival: Effect, own: Effect, names: Sequence[str]) -> str:
 def _doubts(finding: Finding, diagnosis: Diagnosis, names: Sequence[str]) -> Iterator[str]:
     """Why it may be something else, beside its rivals."""
     left = diagnosis.misfit_after
-    for joint in finding.terms[0].effect.touched(len(names)):
-        if left.significant[joint] and left.excess[joint] > finding.gain:
-            yield f"More than it explains is left at {names[joint]}: unmodelled physics may be causing this"
+    open_joints = [joint for joint in finding.terms[0].effect.touched(len(names)) if left.significant[joint]]
+    worst = max(open_joints, key=lambda joint: left.excess[joint], default=None)
+    if worst is not None and left.excess[worst] > finding.gain:
+        yield f"More than it explains is left at {names[worst]}: unmodelled physics may be causing this"
 
 
 def _held_out(finding: Finding, names: Sequence[str], *, tentative: bool) -> str:

@@ -58,17 +58,17 @@ class Finding:
     formula: Effect | None = None  # the law whose error may be all that this one explains (`formula_error`)
 
     @property
-    def is_ruled(self) -> NDArray[np.bool_]:
+    def is_own(self) -> NDArray[np.bool_]:
         """Whether their formula holds at a joint, (n,)."""
         count = len(self.after.train)
-        return np.isin(np.arange(count), self.terms[0].effect.ruled(count))
+        return np.isin(np.arange(count), self.terms[0].effect.find_own_joints(count))
 
     @property
-    def explained(self) -> Array:
+    def relative_energy(self) -> Array:
         """Squares that they take off the residuals of these joints, (n,), in what is left of training and held-out."""
         pairs = [(self.before.train, self.after.train), (self.before.held_out, self.after.held_out)]
         taken = [_relative_squares(b, a) - 1.0 for b, a in pairs if b is not None and a is not None]
-        return np.where(self.is_ruled, np.maximum(np.sum(taken, axis=0), 0.0), 0.0)
+        return np.where(self.is_own, np.maximum(np.sum(taken, axis=0), 0.0), 0.0)
 
     @property
     def place(self) -> Place:

@@ -25,8 +25,8 @@ def doubt_formulas(findings: Sequence[Finding], sites: int) -> list[Finding]:
 
 
 def _doubt(finding: Finding, laws: Sequence[Finding], sites: int) -> Finding:
-    own = finding.explained
-    beside = [np.where(finding.is_ruled, law.explained, 0.0) for law in laws]
+    own = finding.relative_energy
+    beside = [np.where(finding.is_own, law.relative_energy, 0.0) for law in laws]
     energy = float(np.max(beside, axis=0, initial=0.0).sum())
     if energy == 0.0:
         return finding

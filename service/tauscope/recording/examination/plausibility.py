@@ -64,6 +64,7 @@ def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> str | None:
     if np.abs(ratios[known] / typical - 1.0).max() > AGREEMENT or abs(typical - 1.0) < AGREEMENT:
         return None
     joint = int(np.flatnonzero(known)[0])
+    # The usual units: among all of them, some ratio fits anything.
     angles, lengths = {key: RADIANS[key] for key in ("rad", "deg")}, {key: METRES[key] for key in ("m", "mm")}
     positions = lengths if types[joint] is JointType.PRISMATIC else angles
     speeds = lengths if types[joint] is JointType.PRISMATIC else {**angles, "rpm": RADIANS["rpm"]}
