@@ -86,19 +86,16 @@ def is_numbered(header: Sequence[str]) -> bool:
 
 
 def _guess_by_place(width: int, joint_count: int | None) -> RecordingLayout:
+    """Groups behind the time, behind all that `ros2 topic echo --csv` writes before them, or without time."""
     counts = [joint_count] if joint_count else [*_COMMON_JOINT_COUNTS, (width - 1) // 2]
-    for n in counts:
-        for groups in (("q", "tau"), ("q", "qd", "tau")):
-            if n > 0 and width == len(groups) * n + 1:
-                places = {group: [2 + k * n + j for j in range(n)] for k, group in enumerate(groups)}
-                return RecordingLayout(columns={"t": 1, **places})
-            if n > 0 and width == len(groups) * n:  # without time
-                places = {group: [1 + k * n + j for j in range(n)] for k, group in enumerate(groups)}
-                return RecordingLayout(columns=places)
-            # `ros2 topic echo --csv`: sec, nanosec, frame, names, q, qd if there is any, effort
-            if n > 0 and width == (len(groups) + 1) * n + 3:
-                places = {group: [4 + k * n + j for j in range(n)] for k, group in enumerate(groups, 1)}
-                return RecordingLayout(columns={"t": [1, 2], **places})
+    shapes = [(n, groups) for n in counts if n > 0 for groups in (("q", "tau"), ("q", "qd", "tau"))]
+    times: Sequence[tuple[dict[str, Source], bool]] = (({"t": 1}, False), ({"t": [1, 2]}, True), ({}, False))
+    for time, has_names in times:
+        for n, groups in shapes:
+            first = (3 + n if has_names else len(time)) + 1
+            if width == first - 1 + len(groups) * n:
+                places = {group: [first + k * n + j for j in range(n)] for k, group in enumerate(groups)}
+                return RecordingLayout(columns={**time, **places})
     return RecordingLayout(columns={})
 
 
