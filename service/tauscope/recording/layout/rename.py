@@ -79,7 +79,9 @@ class _Mapping:
 
     def __init__(self, header: Sequence[str], reading: Reading, file: str) -> None:
         self._header, self._file = header, file
-        self._known = {name: len(header) - 1 - place for place, name in enumerate(reversed(header))}  # the first one
+        self._places: dict[str, list[str]] = {}
+        for place, name in enumerate(header, 1):
+            self._places.setdefault(name, []).append(str(place))
         self._robot = reading.joint_names
         self._names: Sequence[str] | None = reading.joint_names
 
@@ -105,14 +107,14 @@ class _Mapping:
     def _find(self, source: Source, target: str) -> int:
         """Index of a column, by its name, or by its number from 1 where no column has that name."""
         name = str(source)
-        places = [str(place) for place, each in enumerate(self._header, 1) if each == name]
+        places = self._places.get(name, [])
         if len(places) > 1:
             raise RecordingError(
                 f"{self._file}: columns: {target}: {len(places)} columns are named {printable(name)}; give one by its "
                 f"number, {listed(places)}"
             )
-        if name in self._known:
-            return self._known[name]
+        if places:
+            return int(places[0]) - 1
         if isinstance(source, int) and 0 < source <= len(self._header):
             return source - 1
         near = difflib.get_close_matches(name, self._header, 1)
@@ -124,7 +126,7 @@ class _Mapping:
             return source
         template = str(source)
         if not any(placeholder in template for placeholder in PLACEHOLDERS):
-            if template in self._known:
+            if template in self._places:
                 return [template]
             element = next(
                 (
@@ -140,7 +142,7 @@ class _Mapping:
         if not any(placeholder in template for placeholder in PLACEHOLDERS):
             return [template]
         found = []
-        while (name := fill_template(template, len(found), None)) in self._known:
+        while (name := fill_template(template, len(found), None)) in self._places:
             found.append(name)
         wanted = None if self._robot is None else len(self._robot)
         if wanted is not None and len(found) > wanted and group in ("q", *_EFFORTS):
