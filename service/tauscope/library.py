@@ -55,7 +55,7 @@ def read_recording(
     delimiter: str | None = None,
     topic: str | None = None,
 ) -> "Recording":
-    """Read a recording: CSV, Parquet, MCAP or rosbag2; samples that are none are masked or repaired.
+    """Read a recording: a table, MCAP or a bag; samples that are none are masked or repaired.
 
     Parameters
     ----------

@@ -10,6 +10,7 @@ from typing import Any
 
 import lz4.frame
 import numpy as np
+from scipy.io import savemat
 
 from reliability.costly_inputs import SMALL, mcap_file, mcap_record, mcap_text
 from tauscope.recording.mcap_format import MCAP_MAGIC
@@ -112,6 +113,21 @@ def write_npz_bombs() -> Iterator[tuple[str, bytes]]:
     arrays: dict[str, Any] = {f"a{n}": np.zeros(1) for n in range(400)}
     np.savez_compressed(text, **arrays)
     yield "many.npz", text.getvalue()
+
+
+def write_array_bombs() -> Iterator[tuple[str, bytes]]:
+    """MATLAB files of zeros, and JSON that is deep, wide or of many objects."""
+    for name, shape in (("zeros", (4_000_000, 1)), ("wide", (2, 2_000_000))):
+        text = io.BytesIO()
+        savemat(text, {"q": np.zeros(shape)}, do_compression=True)
+        yield f"{name}.mat", text.getvalue()
+    text = io.BytesIO()
+    savemat(text, {f"a{n}": np.zeros(1) for n in range(400)}, do_compression=True)
+    yield "many.mat", text.getvalue()
+    yield "deep.json", b'{"a": ' * (SMALL // 6)
+    yield "keys.json", json.dumps({f"k{n}": [n] for n in range(SMALL // 14)}).encode()
+    yield "objects.jsonl", b"{}\n" * (SMALL // 3)
+    yield "sparse.jsonl", b"".join(b'{"k%d":1}\n' % n for n in range(SMALL // 12))
 
 
 def write_mjcf_bombs() -> Iterator[tuple[str, str]]:

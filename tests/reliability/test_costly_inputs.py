@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from reliability.costly_archives import (
+    write_array_bombs,
     write_bag_bombs,
     write_document_bombs,
     write_indexed_bombs,
@@ -114,7 +115,7 @@ def list_bombs() -> Iterator[tuple[str, str, bytes]]:
         yield "trajectory", f"{name}.{'csv' if name == 'csv' else 'json'}", text.encode()
     for name, content in write_mcap_bombs():
         yield "recording", f"{name}.mcap", content
-    for name, content in (*write_indexed_bombs(), *write_bag_bombs(), *write_npz_bombs()):
+    for name, content in (*write_indexed_bombs(), *write_bag_bombs(), *write_npz_bombs(), *write_array_bombs()):
         yield "recording", name, content
     for name, text in write_mjcf_bombs():
         yield "received robot", name, text.encode()

@@ -51,7 +51,7 @@ RobotFile = Annotated[
 RecordingFile = Annotated[
     Path,
     name_input(
-        "Recording: CSV, Parquet, NumPy archive, MCAP, rosbag2 folder, or ROS 1 bag.",
+        "Recording: CSV, Parquet, NumPy, MATLAB, JSON, MCAP, rosbag2 folder, or ROS 1 bag.",
         "FILE",
         Argument,
         parser=_find_input,

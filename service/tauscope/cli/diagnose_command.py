@@ -46,7 +46,9 @@ def diagnose(
     robot: RobotFile,
     recordings: Annotated[
         list[Path],
-        name_recordings("Recordings of the real arm that are to be explained: CSV, Parquet, NumPy, MCAP or a bag."),
+        name_recordings(
+            "Recordings of the real arm that are to be explained: CSV, Parquet, NumPy, MATLAB, JSON, MCAP, bag."
+        ),
     ],
     *,
     held_out: HeldOut = None,

@@ -32,7 +32,7 @@ from tauscope.tasks import identify as task
 def identify(
     robot: RobotFile,
     recordings: Annotated[
-        list[Path], name_recordings("Recordings that train the model: CSV, Parquet, NumPy, MCAP, bag.")
+        list[Path], name_recordings("Recordings that train the model: CSV, Parquet, NumPy, MATLAB, JSON, MCAP, bag.")
     ],
     *,
     held_out: HeldOut = None,

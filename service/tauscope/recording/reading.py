@@ -8,7 +8,7 @@ from pathlib import Path
 from pydantic import Field
 
 from tauscope.errors import RecordingError
-from tauscope.recording import column_files
+from tauscope.recording import array_files, column_files
 from tauscope.recording.columns import is_column, require_joint_count
 from tauscope.recording.csv_format import read_csv, read_csv_header
 from tauscope.recording.intake import Choice
@@ -43,8 +43,10 @@ _FORMATS = (
     _Format(MCAP_MAGIC, add_log=add_mcap, reads_ranges=True),
     _Format(SQLITE_MAGIC, add_log=add_database),
     _Format(ROS1_MAGIC, add_log=add_ros1_bag),
-    _Format(column_files.ZIP_MAGIC, column_files.read_npz, column_files.read_npz_header),
+    _Format(array_files.ZIP_MAGIC, array_files.read_arrays, array_files.read_arrays_header),
+    _Format(array_files.MATLAB_MAGIC, array_files.read_arrays, array_files.read_arrays_header),
 )
+_JSON = _Format(b"", array_files.read_arrays, array_files.read_arrays_header)
 _CSV = _Format(b"", read_csv, read_csv_header)
 _FOLDER = _Format(b"", add_log=add_rosbag2, reads_ranges=True)
 
@@ -55,8 +57,8 @@ _FOREIGN = (
     (b"\x28\xb5\x2f\xfd", "is compressed by zstd; unpack it first"),
     (b"BZh", "is compressed by bzip2; unpack it first"),
     (b"\xfd7zXZ", "is compressed by xz; unpack it first"),
-    (b"\x89HDF", "is an HDF5 or MATLAB file; export it as CSV"),
-    (b"MATLAB 5.0", "is a MATLAB file; export it as CSV"),
+    (b"\x89HDF", "is an HDF5 file; export it as CSV or Parquet"),
+    (b"MATLAB 7.3", "is a MATLAB file of version 7.3; save it by save(..., '-v7')"),
     (b"\x93NUMPY", "is one NumPy array; save time, positions and torques by np.savez"),
     (b"#ROSBAG V1", "is a bag of ROS 0.x; run `rosbag fix` on it first"),
     (b"\xff\xfe", "is UTF-16 text; save it as UTF-8"),
@@ -67,7 +69,7 @@ _FOREIGN = (
 def read_recording(
     path: str | Path, joint_count: int | None = None, joint_names: Sequence[str] | None = None, reading: Reading = SI
 ) -> Recording:
-    """Read CSV, Parquet, MCAP, a ROS 1 bag, or a rosbag2 folder or database, told apart by content.
+    """Read CSV, JSON, Parquet, NumPy, MATLAB, MCAP, a ROS 1 bag, or a rosbag2 folder or database, told by content.
 
     Raises RecordingError, which names the place; RecordingMismatchError for other joints than `joint_count` asks for.
     """
@@ -141,7 +143,7 @@ def _find_format(path: Path, name: str) -> _Format:
     if path.suffix.lower() in (".mcap", ".parquet", ".db3", ".bag"):
         found = "is empty" if not magic else f"does not begin as a {path.suffix.lower()} file does"
         raise RecordingError(f"{name}: the file {found}; it is damaged or of another format")
-    return _CSV
+    return _JSON if array_files.JSON_START.match(magic) else _CSV
 
 
 def _reason(error: OSError) -> str:

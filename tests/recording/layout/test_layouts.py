@@ -1,7 +1,7 @@
 """Files of other tools: any names, order, units and separators give the same recording, by preset, mapping or guess."""
 
 import importlib.util
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,45 +11,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from recording.layout_files import JOINTS, QD, TAU, TIME, Q, guess_of, read, write
 from recording.recording_files import message_of, rows_of
 from tauscope.errors import RecordingError, RobotFileError
-from tauscope.recording import Reading, Recording, read_recording
+from tauscope.recording import Reading, read_recording
 from tauscope.robot import RecordingLayout, layout_from_dict, read_layout
-
-RNG = np.random.default_rng(3)
-TIME = 100.0 + np.arange(40) * 0.01
-Q, QD, TAU = (np.round(RNG.normal(size=(40, 3)), 6) for _ in range(3))
-JOINTS = ("shoulder_pan", "elbow", "wrist_1")
-
-
-def write(path: Path, header: Sequence[str] | None, rows: np.ndarray, delimiter: str = ",", decimal: str = ".") -> Path:
-    lines = [] if header is None else [delimiter.join(header)]
-    lines += [delimiter.join(repr(value).replace(".", decimal) for value in row) for row in rows.tolist()]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
-
-
-def read(path: Path, layout: RecordingLayout, joints: Sequence[str] | None = None) -> Recording:
-    reading = Reading(columns=layout.columns, decimal=layout.decimal, delimiter=layout.delimiter, units=layout.units)
-    return read_recording(path, joint_names=joints, reading=reading.for_robot(None))
-
-
-def guess_of(message: str) -> RecordingLayout:
-    """The mapping that a refusal prints, pasted."""
-    return paste_layout(message[message.index("recording: {") :])
-
-
-def paste_layout(text: str) -> RecordingLayout:
-    path = Path("/nonexistent")
-    assert not path.exists()
-    return layout_from_dict(_yaml(text))
-
-
-def _yaml(text: str) -> object:
-    from tauscope.robot.yaml_text import read_yaml
-
-    return read_yaml(text, "pasted").data
-
 
 STYLES = {
     "rtde": ("timestamp", "actual_q_{0}", "actual_qd_{0}", "actual_current_as_torque_{0}"),
@@ -294,26 +260,6 @@ def test_what_a_preset_does_not_find_is_named(tmp_path: Path) -> None:
     path = write(tmp_path / "file.csv", header, np.column_stack([TIME, Q]))
     message = message_of(lambda: read(path, read_layout("lerobot"), JOINTS))
     assert "no column holds the effort, which lerobot calls observation_effort or observation_torque or" in message
-
-
-@pytest.mark.parametrize("saves", [np.savez, np.savez_compressed])
-def test_numpy_archives(tmp_path: Path, saves: Callable[..., None]) -> None:
-    path = tmp_path / "log.npz"
-    saves(path, time=TIME, qpos=Q, qvel=QD, qfrc_actuator=TAU, name=np.array("arm"), gains=np.ones(3))
-    recording = read(path, read_layout("mujoco"), JOINTS)
-    assert np.array_equal(rows_of(recording), np.column_stack([TIME, Q, TAU, QD]))
-    assert guess_of(message_of(lambda: read_recording(path))).columns == {
-        "t": "time",
-        "q": "qpos[{0}]",
-        "tau": "qfrc_actuator[{0}]",
-        "qd": "qvel[{0}]",
-    }
-    path.write_bytes(path.read_bytes()[:-300])
-    assert "not a readable NumPy archive" in message_of(lambda: read(path, read_layout("mujoco")))
-    np.savez(path, words=np.array(["a"]))
-    assert "no array holds a row a sample" in message_of(lambda: read(path, read_layout("mujoco")))
-    np.savez(path, time=np.array([object()]))
-    assert "not a readable NumPy archive" in message_of(lambda: read(path, read_layout("mujoco")))
 
 
 def test_lists_in_the_cells_of_a_csv(tmp_path: Path) -> None:
