@@ -170,6 +170,8 @@ def _parse_names(
     else:
         index = named or 0
         fields = dialect.name_fields(sample[index], row)
+        if index + 1 < first and (joined := _join_names(fields, dialect.name_fields(sample[index + 1], row))):
+            fields, index = joined, index + 1
         start += sum(len(each) + 1 for each in raw[:index])
         number += index
         cells = rows.split(row)
@@ -186,6 +188,13 @@ def _find_header(lines: Sequence[bytes], row: bytes, dialect: csv_dialect.Dialec
     cells = len(dialect.split(row))
     named = (not _is_empty(line) and len(dialect.name_fields(line, row)) == cells for line in lines)
     return next((index for index, is_header in enumerate(named) if is_header), None)
+
+
+def _join_names(upper: Sequence[bytes], lower: Sequence[bytes]) -> list[bytes] | None:
+    """Names of two lines, where only both together tell the columns apart: the joint above its quantities."""
+    joined = [b" ".join(filter(None, names)) for names in zip(upper, lower, strict=False)]
+    is_told = len(upper) == len(lower) and len(set(upper)) < len(upper) == len(set(joined))
+    return joined if is_told else None
 
 
 def _name_numbers(comment: bytes, row: Sequence[bytes], dialect: csv_dialect.Dialect) -> list[bytes]:

@@ -76,6 +76,27 @@ class EpisodeClock:
         return (ResultWarning(code="episodes", text=text, remedy=remedy),)
 
 
+class CounterClock:
+    """Goes on where a counter of 16 or 32 bits begins again."""
+
+    def __init__(self) -> None:
+        self._last = np.nan
+        self._base = 0.0
+        self.count = 0  # how often it began again
+
+    def unwrap(self, counts: Array) -> Array:
+        """Counts that rise on, (rows,), of those in the file, (rows,), block by block."""
+        steps, bases = np.diff(counts, prepend=self._last), np.full(len(counts), self._base)
+        for size in (2.0**16, 2.0**32):
+            # Another clock that is set back goes by a whole range, to a thousandth of it, by rare chance only.
+            wraps = (steps < 0) & (steps + size > 0) & (steps + size < 1e-3 * size)
+            bases += size * np.cumsum(wraps)
+            self.count += int(wraps.sum())
+        if len(counts):
+            self._last, self._base = counts[-1], bases[-1]
+        return counts + bases
+
+
 # Rows by which one may come too late and still be put in its place: threads and networks swap neighbours. A clock that
 # is set back, or two files in one, come later by far more.
 LATE_ROWS = 8
@@ -94,6 +115,7 @@ class RowIntake:
         self._tail = np.empty((0, len(names)))
         self._tail_rows = np.empty(0, dtype=np.intp)
         self._origin: float | None = None
+        self._counter = CounterClock()
         self._last = -np.inf
         self._rows = self._repeated = self._late = 0
         self._first_repeated = self._first_late = np.nan
@@ -138,8 +160,9 @@ class RowIntake:
             return block
         converted = block * self._conversion.factor
         if self._conversion.from_first:
-            self._origin = float(block[0, 0]) if self._origin is None else self._origin
-            converted[:, 0] = (block[:, 0] - self._origin) * self._conversion.factor[0]
+            counts = self._counter.unwrap(block[:, 0])
+            self._origin = float(counts[0]) if self._origin is None else self._origin
+            converted[:, 0] = (counts - self._origin) * self._conversion.factor[0]
         return converted
 
     def _order(
@@ -167,6 +190,9 @@ class RowIntake:
 
     def _warnings(self) -> Sequence[ResultWarning]:
         found = []
+        if times := self._counter.count:
+            text = f"the counter began again {'once' if times == 1 else f'{times} times'}; taken as going on"
+            found.append((text, "give each motion a file of its own, if these are several"))
         if self._late:
             rows = counted(self._late, "row")
             text = f"{rows} came after a later one, first at t = {self._first_late:.6g} s; put in order of time"

@@ -76,6 +76,24 @@ def stated_unit(column: str, name: str) -> str | None:
     return next(filter(None, (find_unit(column, text) for text in texts)), texts[-1] if texts else None)
 
 
+_QUANTITIES = {
+    **{"rad": "q", "deg": "q", "mrad": "q", "rev": "q"},
+    **dict.fromkeys(("Nm", "mNm", "Ncm", "Nmm", "kNm", "lbft", "lbin", "ozin"), "tau"),
+    **{"A": "i", "mA": "i"},
+}  # lengths and forces are the tool's, mostly
+
+
+def find_quantity(name: str) -> str | None:
+    """The group whose unit stands in brackets in a name that says nothing else: ``M1 [Nm]``."""
+    for text in _BRACKETED.findall(name):
+        for group in ("q", "tau"):
+            if quantity := _QUANTITIES.get(find_unit(group, text) or ""):
+                return quantity
+        if find_unit("qd", text):
+            return "qd"
+    return None
+
+
 def collect_units(texts: Mapping[str, str | None]) -> dict[str, str]:
     """Units by group, or by column where angles and lengths differ. `texts`: what columns of CONTRACT.md state.
 

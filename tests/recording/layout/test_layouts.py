@@ -312,6 +312,33 @@ def test_structures_and_arrays_with_a_column_a_sample(tmp_path: Path) -> None:
         assert np.array_equal(each.effort, TAU)
 
 
+def test_columns_that_only_their_unit_tells(tmp_path: Path) -> None:
+    header = ["t [s]", *(f"A{k} [deg]" for k in (1, 2, 3)), *(f"M{k} [Nm]" for k in (1, 2, 3))]
+    header += [*(f"error {k} [deg]" for k in (1, 2, 3)), *(f"F{k} [N]" for k in (1, 2, 3))]
+    path = write(tmp_path / "file.csv", header, np.column_stack([TIME, np.degrees(Q), TAU, QD, QD]))
+    layout = guess_of(message_of(lambda: read_recording(path, joint_names=JOINTS)))
+    assert layout.columns == {"t": "t [s]", "q": "A{1} [deg]", "tau": "M{1} [Nm]"}
+    samples = read(path, layout, JOINTS).samples()
+    assert np.allclose(samples.position, Q)
+    assert np.array_equal(samples.effort, TAU)
+
+
+@pytest.mark.parametrize("has_joints", [True, False])
+def test_names_on_two_lines_or_repeated(tmp_path: Path, has_joints: bool) -> None:
+    joints = ["", *(f"Joint {k}" for k in (1, 2, 3) for _ in range(2))]
+    names = ["Time", *["Position", "Torque"] * 3]
+    head = [",".join(joints)] if has_joints else []
+    values = np.column_stack([TIME, np.stack([Q, TAU], axis=2).reshape(len(TIME), 6)])
+    lines = [*head, ",".join(names), *(",".join(map(repr, row)) for row in values.tolist())]
+    path = tmp_path / "file.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    layout = guess_of(message_of(lambda: read_recording(path, joint_names=JOINTS)))
+    by_place = {"t": "Time", "q": [2, 4, 6], "tau": [3, 5, 7]}
+    by_name = {"t": "Time", "q": "Joint {1} Position", "tau": "Joint {1} Torque"}
+    assert layout.columns == (by_name if has_joints else by_place)
+    assert np.array_equal(rows_of(read(path, layout, JOINTS)), np.column_stack([TIME, Q, TAU]))
+
+
 def test_units_in_names(tmp_path: Path) -> None:
     header = [
         "Time [ms]",

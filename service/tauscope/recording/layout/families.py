@@ -59,6 +59,11 @@ def role_of(words: Sequence[str]) -> tuple[str, int] | None:
     return (role, sum(_LEVELS.get(word, 0) for word in words)) if role else None
 
 
+def is_silent(words: Sequence[str]) -> bool:
+    """Whether no word says which quantity a column holds, or that it holds another one."""
+    return _NO_NAMES.union(_FOREIGN).isdisjoint(words)
+
+
 def time_rank(words: Sequence[str]) -> int | None:
     """How likely a column is the time; the least is the likeliest, None where it is none."""
     name = "_".join(word for word in words if word not in ("ms", "us", "ns", "s", "min"))
@@ -85,7 +90,8 @@ class Family:
     """Columns of one quantity, one a joint."""
 
     template: str  # name of the columns with a placeholder for the joint
-    columns: tuple[str, ...]  # columns in the order of the joints: by number, of the robot, or of the file
+    # columns in the order of the joints: by number, of the robot, or of the file; by place where they have one name
+    columns: tuple[str | int, ...]
     is_regular: bool = True  # whether the template gives the columns; zeros in front of a number it does not
     is_guessed: bool = False  # whether the joints' names are any part of the columns' names
 
@@ -102,11 +108,12 @@ def words_of(text: str) -> tuple[str, ...]:
 
 def find_families(header: Sequence[str], joint_names: Sequence[str] | None) -> list[Family]:
     """Families of a header: named by the robot's joints, numbered, or named by any word; one joint has no number."""
+    repeated = _find_repeated(header)
     header = [name for name in header if len(name) <= LONGEST_NAME]
     named = _find_named_families(header, joint_names or ())
     has_one = joint_names is None or len(joint_names) == 1
     single = [Family(name, (name,), is_guessed=True) for name in header if has_one and not _NUMBER.search(name)]
-    return [*named, *_find_numbered(header), *([] if named else _find_segment_families(header)), *single]
+    return [*named, *_find_numbered(header), *([] if named else _find_segment_families(header)), *single, *repeated]
 
 
 def fill_template(template: str, index: int, name: str | None) -> str:
@@ -120,6 +127,18 @@ def names_in(header: Sequence[str], template: str) -> list[str]:
     before, _, after = template.partition(BY_NAME)
     pattern = re.compile(re.escape(before) + "(.+)" + re.escape(after))
     return [match[1] for match in map(pattern.fullmatch, header) if match]
+
+
+def _find_repeated(header: Sequence[str]) -> list[Family]:
+    """Families whose columns all have one name."""
+    places: dict[str, list[int]] = {}
+    for place, name in enumerate(header, 1):
+        places.setdefault(name[: LONGEST_NAME + 1], []).append(place)
+    return [
+        Family(name, tuple(found), is_regular=False)
+        for name, found in places.items()
+        if len(found) > 1 and len(name) <= LONGEST_NAME
+    ]
 
 
 def _find_numbered(header: Sequence[str]) -> list[Family]:

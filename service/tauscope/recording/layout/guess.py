@@ -4,13 +4,15 @@ import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 
-from tauscope.recording.layout.families import Family, find_families, role_of, time_rank, words_of
+from tauscope.recording.layout.families import Family, find_families, is_silent, role_of, time_rank, words_of
 from tauscope.recording.layout.presets import PRESET_OF, Preset
+from tauscope.recording.unit_text import find_quantity
 from tauscope.robot.recording_layout import RecordingLayout, Source
 
 _COMMON_JOINT_COUNTS = (6, 7)
 _PLAIN = re.compile(r"(?!(?:y|n|yes|no|on|off|true|false|null)$)[A-Za-z_][A-Za-z0-9_./-]*", re.IGNORECASE)
 _WHOLE_SECONDS = re.compile(r"(.*[^A-Za-z]|)secs?")
+_BY_UNIT_ALONE = 6  # behind every rank by words
 _OPTIONAL = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt")
 
 # The group that words of a column mean, and how far they are from the first choice.
@@ -46,7 +48,10 @@ def guess_parts(
     if is_numbered(header):
         return _guess_by_place(len(header), None if joint_names is None else len(joint_names))
     rank = role_of if preset is None else _preset_ranking(PRESET_OF[preset])
-    families = [(family, found) for family in find_families(header, joint_names) if (found := rank(family.words))]
+    every = find_families(header, joint_names)
+    families = [(family, found) for family in every if (found := rank(family.words))]
+    if preset is None:
+        families += [(family, found) for family in every if (found := _rank_by_unit(family))]
     time = _find_time(header, None if preset is None else PRESET_OF[preset].columns["t"])
     count = None if joint_names is None else len(joint_names)
     q = _choose(families, "q", count)
@@ -62,6 +67,11 @@ def guess_parts(
         columns = {"t": 1}
     columns |= {group: _source(family, count) for group, family in groups.items() if family is not None}
     return RecordingLayout(columns=columns)
+
+
+def _rank_by_unit(family: Family) -> tuple[str, int] | None:
+    quantity = find_quantity(family.template) if is_silent(family.words) else None
+    return None if quantity is None else (quantity, _BY_UNIT_ALONE)
 
 
 def layout_text(layout: RecordingLayout) -> str:
