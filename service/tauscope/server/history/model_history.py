@@ -14,9 +14,9 @@ from tauscope.identification import IdentificationDocument
 from tauscope.robot.messages import nearest, shown
 from tauscope.server.history.gates import Gate, ModelPolicy
 from tauscope.server.history.model_judgement import Candidate, choose, judge
-from tauscope.server.store.database.database import Database, read_row
+from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.tables import Item, Model, ModelEvent, Robot, RobotPolicy
-from tauscope.strict_model import entry
+from tauscope.strict_model import entry, take_fields
 
 
 @dataclass(frozen=True)
@@ -185,8 +185,8 @@ def _model(session: Session, identifier: str) -> Model:
 
 def _entry(model: Model) -> ModelEntry:
     gates = tuple(Gate(**gate) for gate in model.gates)
-    return read_row(ModelEntry, model, robot=model.robot.name, gates=gates)
+    return take_fields(ModelEntry, model, robot=model.robot.name, gates=gates)
 
 
 def _event(event: ModelEvent) -> ModelEventEntry:
-    return read_row(ModelEventEntry, event, number=event.id, robot=event.robot.name)
+    return take_fields(ModelEventEntry, event, number=event.id, robot=event.robot.name)

@@ -3,10 +3,9 @@
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import fields
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from alembic import command
 from alembic.config import Config
@@ -112,16 +111,8 @@ def _configuration(connection: Connection | None) -> Config:
 
 
 FILE_NAME = "tauscope.db"  # of the SQLite database in a data folder
-Entry = TypeVar("Entry")
 _SQLITE_MAGIC = b"SQLite format 3\0"
 _DAMAGE_HINT = "restore a backup, or move it away: the index is made anew, schedules and the choice of models are not"
-
-
-def read_row(kind: type[Entry], row: object, **more: Any) -> Entry:
-    """What is given out of a row: a dataclass of the same attributes. `more`: those that the row has not so."""
-    known: Any = kind
-    names = (field.name for field in fields(known) if field.name not in more)
-    return kind(**{name: getattr(row, name) for name in names}, **more)
 
 
 class Database:

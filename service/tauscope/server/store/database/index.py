@@ -8,10 +8,10 @@ from pydantic import Field
 from sqlalchemy import ColumnElement, delete, insert, select, update
 from sqlalchemy.orm import Session
 
-from tauscope.server.store.database.database import Database, read_row
+from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.tables import Artefact, Item, Recording, RecordingUse, Robot, Site
 from tauscope.server.store.recordings import StoredRecording
-from tauscope.strict_model import entry
+from tauscope.strict_model import entry, take_fields
 
 
 @dataclass(frozen=True)
@@ -124,8 +124,7 @@ class Index:
             for each in facts:
                 row = rows.get(each.identifier)
                 if row is None:
-                    row = Item.__mapper__.polymorphic_map[kind].class_(site=site, kind=kind, identifier=each.identifier)
-                    rows[each.identifier] = row
+                    row = rows[each.identifier] = Item(site=site, kind=kind, identifier=each.identifier)
                     session.add(row)
                 _fill(row, each)
                 row.robot_id = None if each.robot is None else robots[each.robot]
@@ -156,7 +155,7 @@ class Index:
         query = select(Artefact).join(Item).where(*self._match(kind, identifier))
         with self._database.reading() as session:
             rows = session.scalars(query.order_by(Artefact.path))
-            return tuple(read_row(FileMetadata, row) for row in rows)
+            return tuple(take_fields(FileMetadata, row) for row in rows)
 
     def _match(self, kind: str, identifier: str) -> tuple[ColumnElement[bool], ...]:
         return Item.site == self.site, Item.kind == kind, Item.identifier == identifier
@@ -205,7 +204,7 @@ class Index:
     def robots(self) -> list[RobotEntry]:
         with self._database.reading() as session:
             rows = session.scalars(select(Robot).order_by(Robot.name))
-            return [read_row(RobotEntry, row) for row in rows]
+            return [take_fields(RobotEntry, row) for row in rows]
 
 
 def _fill(row: Item, facts: ItemMetadata) -> None:
@@ -235,4 +234,4 @@ def _find_robots(session: Session, facts: Sequence[ItemMetadata]) -> dict[str, i
 
 def _entry(row: Item) -> ItemEntry:
     figures = {column: getattr(row, column) for column in FIGURES.get(row.kind, ())}
-    return read_row(ItemEntry, row, robot=row.robot and row.robot.name, figures=figures)
+    return take_fields(ItemEntry, row, robot=row.robot and row.robot.name, figures=figures)
