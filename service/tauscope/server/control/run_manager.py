@@ -225,14 +225,10 @@ class RunSupervisor:
         if not self._stop_requested.is_set():
             self._halt()
             _log.info("run %s is stopped: %s", self._workspace.folder.name, why)
-            self._report_step(f"stop: {why}")
-
-    def _report_step(self, step: str) -> None:
-        """Tell a step; a disk that takes none holds nothing up."""
-        try:
-            self._workspace.write_step(step)
-        except OSError:
-            _log.exception("a step of run %s could not be written", self._workspace.folder.name)
+            try:  # a disk that takes no step holds nothing up
+                self._workspace.write_step(f"stop: {why}")
+            except OSError:
+                _log.exception("a step of run %s could not be written", self._workspace.folder.name)
 
     def _handle_event(self, event: Mapping[str, Any]) -> None:
         state = RunState(event["state"])

@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field, FiniteFloat
 
 from tauscope.identification.result import IdentificationDocument, LinkEntry
+from tauscope.robot import LinkInertia, pseudo_inertia
 from tauscope.strict_model import ResultModel, entry
 
 Ratio = Annotated[FiniteFloat, Field(ge=1.0)]
@@ -97,11 +98,7 @@ def is_physical(link: LinkEntry) -> bool:
     """Whether a link's pseudo-inertia [[½ tr(I) 1 − I, m s], [(m s)ᵀ, m]] has no negative eigenvalue."""
     i = link.inertia
     inertia = np.array([[i.xx, i.xy, i.xz], [i.xy, i.yy, i.yz], [i.xz, i.yz, i.zz]])
-    pseudo = np.empty((4, 4))
-    pseudo[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    pseudo[:3, 3] = pseudo[3, :3] = link.first_moment
-    pseudo[3, 3] = link.mass
-    eigenvalues = np.linalg.eigvalsh(pseudo)
+    eigenvalues = np.linalg.eigvalsh(pseudo_inertia(LinkInertia(link.mass, np.array(link.first_moment), inertia)))
     return bool(eigenvalues[0] >= -1e-6 * max(eigenvalues[-1], 1e-12))
 
 

@@ -76,28 +76,26 @@ _OF_STATUS: Mapping[int, str] = {404: "not-found", 405: "method-not-allowed", 41
 
 
 def install_problem_handlers(app: FastAPI) -> None:
-    app.add_exception_handler(TauscopeError, _tauscope_error)
-    app.add_exception_handler(RequestValidationError, _validation_error)
-    app.add_exception_handler(HTTPException, _http_exception)
-    app.add_exception_handler(OSError, _system_error)
-    app.add_exception_handler(ClientDisconnect, _client_gone)
+    app.exception_handler(TauscopeError)(_tauscope_error)
+    app.exception_handler(RequestValidationError)(_validation_error)
+    app.exception_handler(HTTPException)(_http_exception)
+    app.exception_handler(OSError)(_system_error)
+    app.exception_handler(ClientDisconnect)(_client_gone)
 
 
-async def _tauscope_error(request: Request, error: Exception) -> Response:
-    code = _OF_ERROR.get(type(error)) or getattr(error, "code", "internal")
+async def _tauscope_error(request: Request, error: TauscopeError) -> Response:
+    code = _OF_ERROR.get(type(error), error.code)
     headers = {"Retry-After": "10"} if code in ("queue-full", "busy") else None
     return problem_answer(make_problem(code, str(error), request.url.path), headers)
 
 
-async def _validation_error(request: Request, error: Exception) -> Response:
-    assert isinstance(error, RequestValidationError)  # noqa: S101 - Starlette looks handlers up by type
+async def _validation_error(request: Request, error: RequestValidationError) -> Response:
     fields = field_errors(error.errors())
     return problem_answer(make_problem("invalid-request", summarise(fields), request.url.path, fields))
 
 
-async def _http_exception(request: Request, error: Exception) -> Response:
+async def _http_exception(request: Request, error: HTTPException) -> Response:
     """A problem that only a service meets: one of ours, or one of the framework's."""
-    assert isinstance(error, HTTPException)  # noqa: S101 - Starlette looks handlers up by type
     path = request.url.path
     if isinstance(error, ProblemError):
         return problem_answer(make_problem(error.code, error.detail, path, error.errors), error.headers)
@@ -113,9 +111,9 @@ async def _http_exception(request: Request, error: Exception) -> Response:
     return problem_answer(make_problem(_OF_STATUS.get(error.status_code, "bad-request"), detail, path), headers)
 
 
-async def _system_error(request: Request, error: Exception) -> Response:
+async def _system_error(request: Request, error: OSError) -> Response:
     """A full disk is said; any other failure of the system is a fault to look into."""
-    if isinstance(error, OSError) and is_disk_full(error):
+    if is_disk_full(error):
         _log.error("the disk is full")
         text = "the service's disk is full; remove recordings or identifications"
         return problem_answer(make_problem("storage-full", text, request.url.path))

@@ -128,7 +128,7 @@ class IdempotentRequests(HttpMiddleware):
         if not _KEY.fullmatch(key):
             text = f"header {HEADER}: give 1 to {LONGEST_KEY} characters without blanks, for example a UUID"
             return await self.refuse(ProblemError("invalid-request", text), scope, receive, send)
-        store = _answers_of(scope)
+        store = cast(StoredAnswers, scope["app"].state.services.answers)
         # Nobody meets another caller's answers.
         words = (find_caller(scope).key or "local", scope["path"], key)
         name = hashlib.sha256("\n".join(words).encode()).hexdigest()
@@ -142,12 +142,13 @@ class IdempotentRequests(HttpMiddleware):
             return await (await _repeat(scope, receive, store, name, is_underway))(scope, receive, send)
         self._underway.add(name)
         try:
-            await self._answer_first(scope, receive, send, name)
+            await self._answer_first(scope, receive, send, store, name)
         finally:
             self._underway.discard(name)
 
-    async def _answer_first(self, scope: AsgiScope, receive: Receive, send: Send, name: str) -> None:
-        store = _answers_of(scope)
+    async def _answer_first(
+        self, scope: AsgiScope, receive: Receive, send: Send, store: StoredAnswers, name: str
+    ) -> None:
         fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
         answer = _Captured()
         await self.app(scope, _count_body(receive, fingerprint), answer.take)
@@ -165,10 +166,6 @@ class IdempotentRequests(HttpMiddleware):
 def is_repeatable(path: str) -> bool:
     """Whether a POST to a path creates or moves something, and is done once for an Idempotency-Key."""
     return _REPEATABLE.fullmatch(path) is not None
-
-
-def _answers_of(scope: AsgiScope) -> StoredAnswers:
-    return cast(StoredAnswers, scope["app"].state.services.answers)
 
 
 class _Captured:

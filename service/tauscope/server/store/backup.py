@@ -19,6 +19,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from tauscope.errors import StoreError
 from tauscope.files import open_atomically, sync_folder
 from tauscope.server.store.database import database as store
+from tauscope.server.store.files import hash_file
 
 _FORM = "alembic_version"
 
@@ -227,16 +228,12 @@ def _content(archive: tarfile.TarFile, entry: tarfile.TarInfo) -> IO[bytes]:
 def _write(file: IO[bytes], path: Path) -> tuple[int, str]:
     """Write a file; its size and its sha256."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    digest, size = hashlib.sha256(), 0
     with path.open("xb") as target:
-        while piece := file.read(_PIECE):
-            digest.update(piece)
-            size += len(piece)
-            target.write(piece)
+        shutil.copyfileobj(file, target, _PIECE)
         target.flush()
         os.fsync(target.fileno())
     path.chmod(0o640)
-    return size, digest.hexdigest()
+    return path.stat().st_size, hash_file(path)
 
 
 def _is_confined(name: str) -> bool:

@@ -62,10 +62,8 @@ class RobotStore:
     def versions(self) -> list[RobotVersion]:
         found = []
         for entry in self._root.iterdir():
-            try:
+            with suppress(NotFoundError):
                 found.append(self.find(entry.name))
-            except NotFoundError:
-                continue
         return sorted(found, key=lambda each: (each.created, each.version), reverse=True)
 
     def find(self, version: str) -> RobotVersion:
