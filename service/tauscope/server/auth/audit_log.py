@@ -20,7 +20,7 @@ from typing import Any
 from tauscope.errors import NotFoundError
 from tauscope.files import sync_folder
 from tauscope.server.store.data_folder import utc_now
-from tauscope.server.store.files import lock_file
+from tauscope.server.store.files import lock_file, parse_object
 
 GENESIS = "0" * 64  # what the first line names as the hash before
 
@@ -66,12 +66,8 @@ def verify_lines(lines: Iterable[bytes], noted: str | None = None) -> Verificati
 
 def parse_entry(line: bytes) -> dict[str, Any] | None:
     """The entry of a whole line; None where it is none."""
-    try:
-        entry = json.loads(line)
-    except (ValueError, RecursionError):
-        return None
-    is_entry = isinstance(entry, dict) and isinstance(entry.get("number"), int) and isinstance(entry.get("hash"), str)
-    return entry if is_entry else None
+    entry = parse_object(line) or {}
+    return entry if isinstance(entry.get("number"), int) and isinstance(entry.get("hash"), str) else None
 
 
 def is_line_of_ours(line: bytes) -> bool:

@@ -177,12 +177,8 @@ def _refer(
 
 
 def merge_problems(answers: dict[str, Any], status: str, answer: dict[str, Any]) -> None:
-    present = answers.setdefault(status, answer)
-    if present is not answer:
-        examples = present["content"][MEDIA_TYPE]["examples"]
-        examples |= {
-            code: each for code, each in answer["content"][MEDIA_TYPE]["examples"].items() if code not in examples
-        }
+    present = answers.setdefault(status, answer)["content"][MEDIA_TYPE]
+    present["examples"] = {**answer["content"][MEDIA_TYPE]["examples"], **present["examples"]}
 
 
 Slot = tuple[Any, Any]  # a list or an object, and the place in it that holds a part

@@ -1,16 +1,15 @@
 """Which problem each exception becomes, and requests that no route foresees: methods and query parameters."""
 
 import logging
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from http import HTTPStatus
 
-from fastapi import APIRouter, FastAPI, Request, Response
-from fastapi.dependencies.models import Dependant
+from fastapi import FastAPI, Request, Response, params
+from fastapi.dependencies.utils import get_flat_params
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
-from starlette.routing import Route, compile_path
+from starlette.routing import Match
 
 from tauscope.errors import TauscopeError, one_line
 from tauscope.files import is_disk_full
@@ -33,32 +32,14 @@ async def require_known_query(request: Request) -> None:
     """Raises ProblemError for a query parameter that the route does not know; a stop is never refused."""
     if not request.query_params or is_stop(request.method, request.url.path):
         return
-    known = set(_find_names(request.scope["route"].dependant))
+    fields = get_flat_params(request.scope["route"].dependant)
+    known = {field.alias for field in fields if isinstance(field.field_info, params.Query)}
     unknown = sorted(set(request.query_params) - known)
     if unknown:
         hint = nearest(unknown[0], known) if known else "this address takes none"
         text = one_line(f"query parameter {shown(unknown[0])} is not known here; {hint}")
         errors = [FieldError(field=one_line(f"query.{name}")[:200], message="not known here") for name in unknown[:100]]
         raise ProblemError("invalid-request", text, errors=errors)
-
-
-def _find_names(dependant: Dependant) -> Iterator[str]:
-    yield from (field.alias for field in dependant.query_params)
-    for other in dependant.dependencies:
-        yield from _find_names(other)
-
-
-Methods = Sequence[tuple[re.Pattern[str], frozenset[str]]]  # for each route the pattern of its path, and its methods
-
-
-def collect_methods(routers: Iterable[tuple[str, APIRouter]]) -> Methods:
-    """The methods of all routes; `routers` with the prefix of their paths."""
-    return tuple(
-        (compile_path(prefix + route.path)[0], frozenset(route.methods or ()))
-        for prefix, router in routers
-        for route in router.routes
-        if isinstance(route, Route)
-    )
 
 
 _log = logging.getLogger("tauscope.api")
@@ -72,6 +53,7 @@ _OF_ERROR: Mapping[type[Exception], str] = {
     LeaseLostError: "lease-lost",
     NotArmedError: "not-armed",
 }
+_METHODS = ("DELETE", "GET", "HEAD", "PATCH", "POST", "PUT")
 _OF_STATUS: Mapping[int, str] = {404: "not-found", 405: "method-not-allowed", 413: "limit-exceeded", 415: "media-type"}
 
 
@@ -105,10 +87,14 @@ async def _http_exception(request: Request, error: HTTPException) -> Response:
     }.get(error.status_code, error.detail)
     headers = dict(error.headers or {})
     if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
-        headers["Allow"] = ", ".join(
-            sorted({each for rule, known in request.app.state.methods if rule.match(path) for each in known})
-        )
+        headers["Allow"] = ", ".join(each for each in _METHODS if _is_known(request, each))
     return problem_answer(make_problem(_OF_STATUS.get(error.status_code, "bad-request"), detail, path), headers)
+
+
+def _is_known(request: Request, method: str) -> bool:
+    """Whether a route answers this method at the address of a request."""
+    scope = {**request.scope, "method": method}
+    return any(route.matches(scope)[0] is Match.FULL for route in request.app.routes)
 
 
 async def _system_error(request: Request, error: OSError) -> Response:

@@ -9,7 +9,7 @@ from concurrent.futures import BrokenExecutor, Executor, Future
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from tauscope.errors import StoreError
-from tauscope.server.queue.worker_pool import WorkerPool
+from tauscope.server.queue.worker_pool import WorkerPool, settle
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -155,11 +155,8 @@ class ClusterExecutor(Executor):
             return
         error = inner.exception()
         if isinstance(error, KilledWorker):
-            outer.set_exception(BrokenExecutor(str(error)))
-        elif error is not None:
-            outer.set_exception(error)
-        else:
-            outer.set_result(inner.result())
+            error = BrokenExecutor(str(error))
+        settle(outer, error, None if error else inner.result())
 
 
 def _not_reached(address: str, error: Exception) -> StoreError:

@@ -73,14 +73,12 @@ class ScheduleRepository:
             return _schedule(session, name)
 
     def schedules(self) -> list[Schedule]:
-        with self._database.reading() as session:
-            return list(session.scalars(select(Schedule).order_by(Schedule.name)))
+        return self._database.fetch(select(Schedule).order_by(Schedule.name))
 
     def due(self, now: datetime) -> list[Schedule]:
         """Schedules that this site may do and that are due, the longest first."""
         query = select(Schedule).where(Schedule.next_due <= now, self._is_mine()).order_by(Schedule.next_due)
-        with self._database.reading() as session:
-            return list(session.scalars(query))
+        return self._database.fetch(query)
 
     def claim(self, schedule: Schedule, next_due: datetime | None, now: datetime) -> int | None:
         """Number of the firing of a due schedule; None where another service has it, or it was changed."""

@@ -18,8 +18,6 @@ from typing_extensions import override
 
 from tauscope.errors import NotFoundError
 from tauscope.robot import RobotReport
-from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
-from tauscope.robot.xml_text import LARGEST_XML
 from tauscope.server.control.run_manager import Manager
 from tauscope.server.http.answers import MOTION, ROOT, SUBMISSION, After, AnswerModel, Identifier, Limit, PageAnswer
 from tauscope.server.http.bodies import PartRule
@@ -350,10 +348,6 @@ def _lease_header(_lease: LeaseToken = None) -> None:
 
 
 def _read_files(folder: Path) -> list[RobotFileAnswer]:
-    answers = []
-    for path in sorted(folder.iterdir()):
-        if path.is_file() and not path.is_symlink():
-            with path.open("rb") as file:
-                content = file.read(max(LARGEST_ROBOT_FILE, LARGEST_XML))
-            answers.append(RobotFileAnswer(name=path.name, content=content.decode("utf-8", errors="replace")))
-    return answers
+    paths = [path for path in sorted(folder.iterdir()) if path.is_file() and not path.is_symlink()]
+    texts = [path.read_bytes().decode("utf-8", errors="replace") for path in paths]
+    return [RobotFileAnswer(name=path.name, content=text) for path, text in zip(paths, texts, strict=True)]

@@ -143,8 +143,7 @@ class Index:
 
     def damaged(self, kind: str) -> frozenset[str]:
         query = select(Item.identifier).where(Item.site == self.site, Item.kind == kind, Item.state == "damaged")
-        with self._database.reading() as session:
-            return frozenset(session.scalars(query))
+        return frozenset(self._database.fetch(query))
 
     def mark_damaged(self, kind: str, identifier: str, detail: str) -> None:
         values = {"state": "damaged", "problem_code": "damaged", "problem_detail": detail}
@@ -153,9 +152,7 @@ class Index:
 
     def artefacts(self, kind: str, identifier: str) -> tuple[FileMetadata, ...]:
         query = select(Artefact).join(Item).where(*self._match(kind, identifier))
-        with self._database.reading() as session:
-            rows = session.scalars(query.order_by(Artefact.path))
-            return tuple(take_fields(FileMetadata, row) for row in rows)
+        return tuple(take_fields(FileMetadata, row) for row in self._database.fetch(query.order_by(Artefact.path)))
 
     def _match(self, kind: str, identifier: str) -> tuple[ColumnElement[bool], ...]:
         return Item.site == self.site, Item.kind == kind, Item.identifier == identifier
@@ -185,8 +182,7 @@ class Index:
     def list_users(self, recording: str) -> frozenset[str]:
         query = select(Item.identifier).join(RecordingUse).where(Item.site == self.site)
         query = query.where(RecordingUse.origin == "server", RecordingUse.name == recording)
-        with self._database.reading() as session:
-            return frozenset(session.scalars(query))
+        return frozenset(self._database.fetch(query))
 
     def search(self, query: ItemQuery) -> list[ItemEntry]:
         columns = (Item.kind, Item.state, Item.site, Robot.name)
@@ -198,13 +194,10 @@ class Index:
         if query.recording_sha256 is not None:
             statement = statement.where(Item.recordings.any(RecordingUse.sha256 == query.recording_sha256))
         statement = statement.order_by(Item.created.desc(), Item.identifier.desc()).limit(query.limit)
-        with self._database.reading() as session:
-            return [_entry(row) for row in session.scalars(statement)]
+        return [_entry(row) for row in self._database.fetch(statement)]
 
     def robots(self) -> list[RobotEntry]:
-        with self._database.reading() as session:
-            rows = session.scalars(select(Robot).order_by(Robot.name))
-            return [take_fields(RobotEntry, row) for row in rows]
+        return [take_fields(RobotEntry, row) for row in self._database.fetch(select(Robot).order_by(Robot.name))]
 
 
 def _fill(row: Item, facts: ItemMetadata) -> None:
