@@ -53,7 +53,6 @@ Rate = Annotated[float, Query(gt=0.0, le=10_000.0, description="samples a second
 
 EXCITATIONS = QueuedTask(
     noun="an excitation",
-    plural="excitations",
     workspace=ExcitationWorkspace,
     models=(ExcitationRequest, ExcitationAnswer),
     examples=EXAMPLES,

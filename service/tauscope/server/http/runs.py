@@ -283,7 +283,6 @@ class Runs(MovingResource):
 
 RUNS = Runs(
     noun="a run",
-    plural="runs",
     models=(RunRequest, RunAnswer),
     workspace=RunWorkspace,
     manager=lambda services: services.runs,

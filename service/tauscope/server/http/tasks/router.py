@@ -32,6 +32,7 @@ from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.job_folder import EndedEvent, JobFolder, ProgressEvent, StateEvent, StepEvent
 from tauscope.server.queue.received_files import check_received_robot, read_received_robot
 from tauscope.server.queue.task_job import stage_workspace
+from tauscope.server.store.data_folder import FOLDERS
 from tauscope.server.store.event_log import LoggedEvent
 
 EVENT_MODELS = (StateEvent, StepEvent, ProgressEvent, EndedEvent)
@@ -157,7 +158,6 @@ class Resource(ABC):
     """What is special about a resource; `words`: of handing in; `parts`: files of a form beside the robot's."""
 
     noun: str
-    plural: str
     models: tuple[type[submission.RobotRequest], type[BaseModel]]
     workspace: type[Any]
     examples: Examples
@@ -170,6 +170,10 @@ class Resource(ABC):
     @property
     def singular(self) -> str:
         return self.noun.rpartition(" ")[2]
+
+    @property
+    def plural(self) -> str:
+        return FOLDERS[self.singular]
 
     def path(self, identifier: str) -> str:
         return f"{ROOT}/{self.plural}/{identifier}"
