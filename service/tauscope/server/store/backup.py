@@ -9,6 +9,7 @@ import shutil
 import tarfile
 import tempfile
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any
@@ -113,7 +114,9 @@ def write_backup(data_folder: Path, database: store.Database, target: Path, vers
             lines.writelines(dump_lines(database.engine))
             _add(archive, _DATABASE, lines, hashes)
         for path in _files(data_folder):
-            _add_file(archive, path, data_folder, hashes)
+            with suppress(FileNotFoundError), path.open("rb") as content:  # else it was removed meanwhile
+                name = f"{_DATA}/{path.relative_to(data_folder).as_posix()}"
+                _add(archive, name, content, hashes, os.fstat(content.fileno()).st_mtime)
         manifest = {"form": FORM, "created": datetime.now(UTC).isoformat(), "version": version, "files": hashes}
         _add(archive, _MANIFEST, io.BytesIO(json.dumps(manifest, indent=1).encode()), {})
     sync_folder(target.parent)
@@ -149,18 +152,6 @@ def _files(data_folder: Path) -> Iterator[Path]:
             is_database = Path(root) == data_folder and name.startswith(store.FILE_NAME)
             if not name.startswith(".") and not is_database and not path.is_symlink() and path.is_file():
                 yield path
-
-
-def _add_file(archive: tarfile.TarFile, path: Path, data_folder: Path, hashes: dict[str, dict[str, Any]]) -> None:
-    """Add a file as far as it goes now; one that was removed meanwhile is left out."""
-    try:
-        file = path.open("rb")
-    except FileNotFoundError:
-        return
-    with file:
-        status = os.fstat(file.fileno())
-        name = f"{_DATA}/{path.relative_to(data_folder).as_posix()}"
-        _add(archive, name, file, hashes, status.st_mtime)
 
 
 def _add(

@@ -68,7 +68,7 @@ class Robot(Base):
 
 
 class Item(Base):
-    """`is_final`: whether its state stays; `stamp` changes with its folder; `artefacts` are its files.
+    """`is_final`: whether its state stays; `stamp` changes with its folder.
 
     Columns that only some kinds have, such as `verdict`, are null elsewhere.
     """
@@ -98,7 +98,6 @@ class Item(Base):
     verdict: Mapped[str | None]
     headline: Mapped[str | None]
     robot: Mapped[Robot | None] = relationship(lazy="joined")
-    artefacts: Mapped[list["Artefact"]] = relationship(cascade="all, delete-orphan", passive_deletes=True)
     recordings: Mapped[list["RecordingUse"]] = relationship(cascade="all, delete-orphan", passive_deletes=True)
 
 
