@@ -129,9 +129,7 @@ def hide_secrets(_logger: Any, _method: str, event: MutableMapping[str, Any]) ->
     """An event without anything that looks like a key or a token."""
     event.pop("color_message", None)  # uvicorn's, for terminals
     for name, value in event.items():
-        if isinstance(value, str):
-            event[name] = _SECRET.sub(_HIDDEN, value)
-        elif not isinstance(value, int | float | bool | None):
+        if not isinstance(value, int | float | bool | None):
             event[name] = _SECRET.sub(_HIDDEN, str(value))
     return event
 

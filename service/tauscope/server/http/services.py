@@ -5,7 +5,7 @@ import shutil
 import threading
 from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import Executor
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import timedelta
 from functools import partial
@@ -118,30 +118,32 @@ def open_services(
     """Take the data folder; end all work on leaving. Raises TauscopeError if the folder or database is unusable."""
     settings.data_folder.mkdir(0o700, parents=True, exist_ok=True)
     access = _open_access(settings)
-    lock = FolderLock(settings.data_folder)
-    try:
+    with ExitStack() as stack:
+        stack.callback(FolderLock(settings.data_folder).release)
         site, database = site_identifier(settings.data_folder), Database(settings.database_address)
-    except BaseException:
-        lock.release()
-        raise
-    readers = open_readers(settings)
-    services = _assemble(settings, access, database, site, executor, readers, start)
-    drift = DriftMonitor(services.models.history, site)
-    _watch(services, drift)
-    housekeeping = Housekeeping(
-        [services.jobs.settle, services.runs.settle, services.index.sync, services.models.judge_new, drift.look]
-    )
-    keys = Housekeeping([services.access.ring.look], CHECK_S)
-    clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
-    filling = threading.Thread(target=_fill_index, args=(services,), name="index", daemon=True)
-    filling.start()
-    filling.join(FILLING_S)
-    housekeeping.start()
-    pruning = Housekeeping(_retention(services), PRUNING_S)
-    pruning.start()
-    if settings.fires_schedules:
-        clock.start()
-    try:
+        stack.callback(database.close)
+        readers = open_readers(settings)
+        services = _assemble(settings, access, database, site, executor, readers, start)
+        drift = DriftMonitor(services.models.history, site)
+        _watch(services, drift)
+        housekeeping = Housekeeping(
+            [services.jobs.settle, services.runs.settle, services.index.sync, services.models.judge_new, drift.look]
+        )
+        keys = Housekeeping([services.access.ring.look], CHECK_S)
+        clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
+        pruning = Housekeeping(_retention(services), PRUNING_S)
+        filling = threading.Thread(target=_fill_index, args=(services,), name="index", daemon=True)
+        filling.start()
+        filling.join(FILLING_S)
+        housekeeping.start()
+        pruning.start()
+        if settings.fires_schedules:
+            clock.start()
+        # Closed from the last one to the first.
+        for close in (housekeeping.close, filling.join, services.index.close):
+            stack.callback(close)
+        stack.callback(readers.shutdown, cancel_futures=True)
+        stack.callback(services.jobs.close)
         with services.audit.writing():
             services.audit.note("service", "began")
             keys.start()
@@ -149,20 +151,9 @@ def open_services(
                 yield services
             finally:
                 services.begin_to_close()
-                keys.close()
-                clock.close()
-                pruning.close()
-                services.runs.close()
-                services.campaigns.close()
+                for part in (keys, clock, pruning, services.runs, services.campaigns):
+                    part.close()
                 services.audit.note("service", "ended")
-    finally:
-        services.jobs.close()
-        readers.shutdown(wait=True, cancel_futures=True)
-        services.index.close()
-        filling.join()
-        housekeeping.close()
-        database.close()
-        lock.release()
 
 
 FILLING_S = 1.0
@@ -203,7 +194,11 @@ def _assemble(
     jobs = JobQueue([*kinds.values()], timed, most_each=settings.max_jobs_per_caller, **bounds)
     audit = AuditTrail(AuditLog(settings.data_folder))
     claims, closing = DeviceClaims(settings.max_arms), threading.Event()
-    leases = Leases(claims, on_end=partial(_note_end, audit))
+
+    def note_end(lease: Lease, why: str) -> None:
+        audit.note("service", "lease ended", subject=lease.id, device=lease.device, holder=lease.holder, reason=why)
+
+    leases = Leases(claims, on_end=note_end)
     start = start or partial(start_control, sim_socket=settings.sim_socket)
     runs = RunManager(items["run"], recordings, start, claims, heartbeat.is_alive, metrics.run_ended)
     dependencies = CampaignDependencies(jobs, kinds, runs, recordings)
@@ -289,10 +284,6 @@ def _watch(services: Services, drift: DriftMonitor) -> None:
     metrics.watch("tauscope_leases", "Leases that hold", lambda: len(services.leases.active()))
     metrics.watch("tauscope_audit_lost", "Entries that the audit log did not take", lambda: services.audit.lost)
     metrics.watch("tauscope_disk_free_bytes", "Room in the data folder", lambda: shutil.disk_usage(folder).free)
-
-
-def _note_end(audit: AuditTrail, lease: Lease, why: str) -> None:
-    audit.note("service", "lease ended", subject=lease.id, device=lease.device, holder=lease.holder, reason=why)
 
 
 def _open_access(settings: Settings) -> Access:
