@@ -1,6 +1,6 @@
 // The kinematic chain in space, drawn by a projection of our own: nearest last, in any pose, from any side.
 
-import { h, named, s } from "./dom.js";
+import { h, named, s, unitsOf } from "./dom.js";
 
 /** A transform from its rows, as the service tells it; the browser's own matrices are told by columns. */
 const matrixOf = (rows) => new DOMMatrix(rows.map((_, k) => rows[4 * (k % 4) + (k >> 2)]));
@@ -147,11 +147,10 @@ export function armDrawing(report) {
 }
 
 export function jointRows(report, number) {
-  const unit = (joint) => (joint.type === "prismatic" ? "m" : "rad");
   return report.joints.map((joint) => [
     `${joint.number}`, joint.name, named(joint.type),
-    joint.limits.position ? `${joint.limits.position.map((v) => number(v, 3)).join(" … ")} ${unit(joint)}` : "–",
-    joint.limits.velocity ? `${number(joint.limits.velocity, 3)} ${unit(joint)}/s` : "–",
-    joint.limits.torque ? `${number(joint.limits.torque, 3)} ${joint.type === "prismatic" ? "N" : "Nm"}` : "–",
+    joint.limits.position ? `${joint.limits.position.map((v) => number(v, 3)).join(" … ")} ${unitsOf(joint.type).position}` : "–",
+    joint.limits.velocity ? `${number(joint.limits.velocity, 3)} ${unitsOf(joint.type).velocity}` : "–",
+    joint.limits.torque ? `${number(joint.limits.torque, 3)} ${unitsOf(joint.type).torque}` : "–",
   ]);
 }

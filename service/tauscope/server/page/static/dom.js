@@ -166,7 +166,7 @@ export function section(id, heading, ...children) {
 
 export function tabs(label, names, chosen, choose) {
   const buttons = names.map((name, place) => h("button", {
-    type: "button", "aria-pressed": place === chosen ? "true" : "false",
+    type: "button", class: "quiet", "aria-pressed": place === chosen ? "true" : "false",
     onclick: () => {
       buttons.forEach((each, other) => each.setAttribute("aria-pressed", other === place ? "true" : "false"));
       choose(place);
