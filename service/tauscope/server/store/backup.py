@@ -189,12 +189,14 @@ def _unpack(source: Path, staged: Path) -> dict[str, Any]:
         found, manifest = {}, None
         with tarfile.open(source, "r|gz") as archive:
             for entry in archive:
-                if not entry.isreg() or not _is_confined(entry.name) or entry.name in found:
+                is_foreign = not entry.isreg() or not _is_confined(entry.name) or entry.name in found
+                content = None if is_foreign else archive.extractfile(entry)
+                if content is None:
                     raise _refuse(source, f"{entry.name}: does not belong there")
                 if entry.name == _MANIFEST:
-                    manifest = json.loads(_content(archive, entry).read())
-                    continue
-                found[entry.name] = _write(_content(archive, entry), staged / entry.name)
+                    manifest = json.loads(content.read())
+                else:
+                    found[entry.name] = _write(content, staged / entry.name)
     except (tarfile.TarError, EOFError, OSError, ValueError) as error:
         if isinstance(error, OSError) and error.errno is not None and not isinstance(error, gzip.BadGzipFile):
             raise
@@ -208,12 +210,6 @@ def _unpack(source: Path, staged: Path) -> dict[str, Any]:
     for name, entry in manifest["files"].items():
         os.utime(staged / name, (entry["modified"], entry["modified"]))
     return expected
-
-
-def _content(archive: tarfile.TarFile, entry: tarfile.TarInfo) -> IO[bytes]:
-    file = archive.extractfile(entry)
-    assert file is not None  # noqa: S101 - it is a regular file
-    return file
 
 
 def _write(file: IO[bytes], path: Path) -> tuple[int, str]:

@@ -85,10 +85,9 @@ class RobotStore:
 
     def remove(self, version: str) -> None:
         """Remove a version. Raises NotFoundError if it is not kept."""
-        going = Path(tempfile.mkdtemp(prefix=_STAGED, dir=self._root)) / version
-        self.files(version).parent.rename(going)
-        sync_folder(self._root)
-        shutil.rmtree(going.parent, ignore_errors=True)
+        with tempfile.TemporaryDirectory(prefix=_STAGED, dir=self._root, ignore_cleanup_errors=True) as going:
+            self.files(version).parent.rename(Path(going) / version)
+            sync_folder(self._root)
 
 
 def hash_robot(folder: Path, robot_file: str) -> str:

@@ -126,7 +126,11 @@ class Index:
                 if row is None:
                     row = rows[each.identifier] = Item(site=site, kind=kind, identifier=each.identifier)
                     session.add(row)
-                _fill(row, each)
+                row.state, row.is_final, row.stamp = each.state, each.is_final, each.stamp
+                row.created, row.ended = each.created, each.ended
+                row.problem_code, row.problem_detail = each.problem or (None, None)
+                for column in FIGURES.get(kind, ()):
+                    setattr(row, column, each.figures.get(column))
                 row.robot_id = None if each.robot is None else robots[each.robot]
             session.flush()
             owned = [(rows[each.identifier].id, each) for each in facts]
@@ -198,14 +202,6 @@ class Index:
 
     def robots(self) -> list[RobotEntry]:
         return [take_fields(RobotEntry, row) for row in self._database.fetch(select(Robot).order_by(Robot.name))]
-
-
-def _fill(row: Item, facts: ItemMetadata) -> None:
-    row.state, row.is_final, row.stamp = facts.state, facts.is_final, facts.stamp
-    row.created, row.ended = facts.created, facts.ended
-    row.problem_code, row.problem_detail = facts.problem or (None, None)
-    for column in FIGURES.get(facts.kind, ()):
-        setattr(row, column, facts.figures.get(column))
 
 
 def _find_robots(session: Session, facts: Sequence[ItemMetadata]) -> dict[str, int]:
