@@ -88,7 +88,8 @@ def _excitation(document: IdentificationDocument, policy: ModelPolicy) -> Gate:
 def _structure(document: IdentificationDocument, active: IdentificationDocument) -> Gate:
     if document.joints != active.joints:
         return Gate("structure", False, "other joints than the active model's; activate it by hand if the arm changed")
-    if _names(document) != _names(active):
+    names, known = ([each.name for each in model.base_parameters] for model in (document, active))
+    if names != known:
         reason = "other base parameters than the active model's: the kinematics differ; if so, activate it by hand"
         return Gate("structure", False, reason)
     return Gate("structure", True, "the same joints and base parameters as the active model")
@@ -105,7 +106,3 @@ def is_physical(link: LinkEntry) -> bool:
 def _ratios(rms: Sequence[float], floor: Sequence[float], joints: Sequence[str]) -> Iterator[tuple[float, str]]:
     for value, reference, joint in zip(rms, floor, joints, strict=True):
         yield (value / reference if reference > 0.0 else (1.0 if value == 0.0 else float("inf"))), joint
-
-
-def _names(document: IdentificationDocument) -> list[str]:
-    return [each.name for each in document.base_parameters]

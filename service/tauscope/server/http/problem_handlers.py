@@ -16,14 +16,7 @@ from tauscope.files import is_disk_full
 from tauscope.robot.messages import nearest, shown
 from tauscope.server.auth.keys import is_stop
 from tauscope.server.control.leases import BusyError, LeasedError, LeaseLostError, LeaseNeededError, NotArmedError
-from tauscope.server.problems import (
-    FieldError,
-    ProblemError,
-    field_errors,
-    make_problem,
-    problem_answer,
-    summarise,
-)
+from tauscope.server.problems import FieldError, ProblemError, field_errors, make_problem, problem_answer, summarise
 from tauscope.server.queue.queue import QueueFullError
 from tauscope.server.store.recordings import NameTakenError
 

@@ -7,6 +7,7 @@ import re
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import cast
 
@@ -75,11 +76,9 @@ class StoredAnswers:
 
     def _tidy(self) -> None:
         for entry in self._folder.iterdir():
-            try:
+            with suppress(OSError):
                 if self._clock() - entry.stat().st_mtime > LIFE_S:
                     entry.unlink(missing_ok=True)
-            except OSError:
-                continue
 
 
 class Fingerprint:

@@ -187,10 +187,10 @@ def _assemble(
         for noun, kind in TASKS.items()
     }
     pool = executor or open_executor(settings.workers, deadline_s=settings.job_timeout_s)
-    timed = TimedExecutor(pool, metrics.job_seconds)
     bounds: dict[str, Any] = {"slots": settings.workers, "most_waiting": settings.max_waiting}
     if isinstance(pool, ClusterExecutor):  # it comes and goes, and so do its workers
         bounds |= {"slots": lambda: pool.width, "is_there": pool.is_there}
+    timed = TimedExecutor(pool, metrics.job_seconds)
     jobs = JobQueue([*kinds.values()], timed, most_each=settings.max_jobs_per_caller, **bounds)
     audit = AuditTrail(AuditLog(settings.data_folder))
     claims, closing = DeviceClaims(settings.max_arms), threading.Event()
@@ -217,8 +217,6 @@ def _assemble(
         "clock": Clock().check,
         "audit log": lambda: f"{audit.lost} entries of the audit log were lost" if audit.lost else None,
     }
-    models = ModelRegistry(ModelHistory(database), site, items)
-    index = open_index(Index(database, site), items, recordings, settings.data_folder.name)
     # What a schedule moves has no lease: it waits for its next time where somebody has one.
     repeater = Repeater(dependencies, campaigns, partial(leases.permit, token=None, owner="schedule", is_needed=False))
     return Services(
@@ -240,15 +238,14 @@ def _assemble(
         closing=closing,
         feeds=EventFeeds(closing),
         heartbeat=heartbeat,
-        index=index,
-        models=models,
+        index=open_index(Index(database, site), items, recordings, settings.data_folder.name),
+        models=ModelRegistry(ModelHistory(database), site, items),
         schedules=Scheduler(ScheduleRepository(database, site, new_boot()), repeater, settings.data_folder),
     )
 
 
 def open_readers(settings: Settings) -> Executor:
-    bounds = {"deadline_s": settings.reading_timeout_s, "memory_bytes": settings.reading_memory_bytes}
-    return WorkerPool(WIDTH, **bounds)
+    return WorkerPool(WIDTH, deadline_s=settings.reading_timeout_s, memory_bytes=settings.reading_memory_bytes)
 
 
 def _retention(services: Services) -> list[Callable[[], object]]:
