@@ -3,6 +3,7 @@
 import json
 import threading
 from collections.abc import Callable, Iterator
+from functools import partialmethod
 from typing import Any
 
 import pytest
@@ -18,7 +19,8 @@ from server.queue.waiting import wait_until
 from tauscope.runtime.record import RunProblem
 from tauscope.runtime.states import RunState
 from tauscope.server.control.run import RunWorkspace
-from tauscope.server.http import Settings, create_app, protection
+from tauscope.server.http import Settings, create_app
+from tauscope.server.http.protection import ConcurrencyLimiter
 from tauscope.server.http.tasks import event_feeds
 from tauscope.server.queue.analyses import ExcitationWorkspace
 from tauscope.server.store.files import KeptFile
@@ -150,14 +152,14 @@ def test_stop_works_while_everything_else_is_stuck(
 ) -> None:
     """The jobs hang, every thread that routes run in is taken, the disk takes nothing, and all locks are held."""
     executor, stuck, let_go = ManualExecutor(), threading.Semaphore(0), threading.Event()
-    slot = protection._Slot
     freed: list[bool] = []
 
     def hang(*_: object, **__: object) -> None:
         stuck.release()
         freed.append(let_go.wait(60.0))
 
-    monkeypatch.setattr(protection, "_Slot", lambda slots, _: slot(slots, 0.02))  # the readers that hang lose theirs
+    impatient = partialmethod(ConcurrencyLimiter.__init__, slot_timeout_s=0.02)  # the readers that hang lose their slot
+    monkeypatch.setattr(ConcurrencyLimiter, "__init__", impatient)
     app = create_app(settings, executor, controls)
     with connected(app) as client:
         answer = begin(client)

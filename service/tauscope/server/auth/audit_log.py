@@ -20,7 +20,7 @@ from typing import Any
 from tauscope.errors import NotFoundError
 from tauscope.files import sync_folder
 from tauscope.server.store.data_folder import utc_now
-from tauscope.server.store.files import lock_file
+from tauscope.server.store.files import lock_file, parse_object
 
 GENESIS = "0" * 64  # what the first line names as the hash before
 
@@ -66,12 +66,8 @@ def verify_lines(lines: Iterable[bytes], noted: str | None = None) -> Verificati
 
 def parse_entry(line: bytes) -> dict[str, Any] | None:
     """The entry of a whole line; None where it is none."""
-    try:
-        entry = json.loads(line)
-    except (ValueError, RecursionError):
-        return None
-    is_entry = isinstance(entry, dict) and isinstance(entry.get("number"), int) and isinstance(entry.get("hash"), str)
-    return entry if is_entry else None
+    entry = parse_object(line) or {}
+    return entry if isinstance(entry.get("number"), int) and isinstance(entry.get("hash"), str) else None
 
 
 def is_line_of_ours(line: bytes) -> bool:
@@ -118,9 +114,24 @@ class AuditLog:
         self._clock = clock
 
     def append(self, actor: str, action: str, **details: Any) -> None:
-        """Add an entry; it is on the disk when this returns. Raises OSError if it cannot be written."""
+        """Chain an entry to the last one; it is on the disk when this returns. Raises OSError if that cannot be.
+
+        A line that a crash cut off stays, and the next entry says so.
+        """
         known = {name: value for name, value in details.items() if value is not None}
-        self._append({"time": self._clock().isoformat(), "actor": actor, "action": action, **known})
+        content = {"time": self._clock().isoformat(), "actor": actor, "action": action, **known}
+        is_new = not self.path.exists()
+        with lock_file(self.path, os.O_APPEND) as descriptor:
+            size = os.fstat(descriptor).st_size
+            *whole, last = os.pread(descriptor, _TAIL, max(0, size - _TAIL)).split(b"\n")
+            if last:
+                content["torn_bytes"] = len(last)
+            entries = (parse_entry(line) for line in reversed(whole))
+            line = chain_line(next((entry for entry in entries if entry is not None), None), content) + b"\n"
+            os.write(descriptor, b"\n" + line if last else line)
+            os.fsync(descriptor)
+        if is_new:
+            sync_folder(self.path.parent)
 
     def verify(self, noted: str | None = None) -> Verification:
         """Check the whole log. Raises NotFoundError if there is no log."""
@@ -129,21 +140,6 @@ class AuditLog:
                 return verify_lines(file, noted)
         except FileNotFoundError:
             raise NotFoundError(f"{self.path}: there is no audit log; name the service's data folder") from None
-
-    def _append(self, content: dict[str, Any]) -> None:
-        """Chain an entry to the last one; a line that a crash cut off stays, and the next entry says so."""
-        is_new = not self.path.exists()
-        with lock_file(self.path, os.O_APPEND) as descriptor:
-            size = os.fstat(descriptor).st_size
-            *whole, last = os.pread(descriptor, _TAIL, max(0, size - _TAIL)).split(b"\n")
-            if last:
-                content = {**content, "torn_bytes": len(last)}
-            entries = (parse_entry(line) for line in reversed(whole))
-            line = chain_line(next((entry for entry in entries if entry is not None), None), content) + b"\n"
-            os.write(descriptor, b"\n" + line if last else line)
-            os.fsync(descriptor)
-        if is_new:
-            sync_folder(self.path.parent)
 
 
 class AuditTrail:

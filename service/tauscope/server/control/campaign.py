@@ -27,13 +27,7 @@ from tauscope.server.control.run import (
 )
 from tauscope.server.control.run_manager import Manager, RunManager, run_recording_name
 from tauscope.server.queue import analyses
-from tauscope.server.queue.job_folder import (
-    JobProblem,
-    JobRecord,
-    JobState,
-    StoppedError,
-    Workspace,
-)
+from tauscope.server.queue.job_folder import JobProblem, JobRecord, JobState, StoppedError, Workspace
 from tauscope.server.queue.queue import CANCELLED, INTERNAL, INTERRUPTED, JobKind, JobQueue, QueueFullError
 from tauscope.server.queue.task_job import Order, TaskWorkspace, order_kept, stage_workspace, submit_job
 from tauscope.server.store.data_folder import ItemStore, staged_identifier
@@ -108,10 +102,6 @@ class CampaignRunner:
         self._run_identifier: str | None = None
         self._stop_requested = threading.Event()
         self._is_closing = False
-
-    @property
-    def holder(self) -> str:
-        return f"campaign {self._workspace.folder.name}"
 
     def stop(self) -> None:
         """Stop the campaign, in whatever step it is; the arm has to be armed again before it moves again."""
@@ -221,7 +211,8 @@ class CampaignRunner:
             design = analyses.ExcitationWorkspace(dependencies.kinds["excitation"].items.folder(excitation))
             take_trajectory(design, staged)
             staged.write_order(request)
-            self._run_identifier = dependencies.runs.submit(staged.folder, ready_motion, self.holder, self._permit)
+            holder = f"campaign {self._workspace.folder.name}"
+            self._run_identifier = dependencies.runs.submit(staged.folder, ready_motion, holder, self._permit)
         self._workspace.record_made(**{link: self._run_identifier})
         if self._stop_requested.is_set():
             dependencies.runs.stop(self._run_identifier)

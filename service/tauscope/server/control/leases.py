@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import count
 
 from typing_extensions import override
@@ -58,8 +59,9 @@ class DeviceClaims:
 class Permit:
     """Leave to move one arm, here one without lease; takes no lock, touches no disk and returns at once."""
 
-    def require(self) -> None:
-        """Raises LeaseError if a motion may not begin."""
+    def __init__(self, require: Callable[[], None] = lambda: None) -> None:
+        """`require`: raises LeaseError if a motion may not begin."""
+        self.require = require
 
     def find_end_reason(self) -> str | None:
         """Why a motion may not go on; None while it may."""
@@ -117,10 +119,10 @@ class Lease:
 
 class LeasePermit(Permit):
     def __init__(self, lease: Lease, find_end_reason: Callable[[Lease], str | None]) -> None:
+        super().__init__(self._require)
         self._lease, self._end_of = lease, find_end_reason
 
-    @override
-    def require(self) -> None:
+    def _require(self) -> None:
         lost = self._end_of(self._lease)
         if lost is not None:
             raise LeaseLostError(f"{self._lease.device}: lease {self._lease.number} ended: {lost}")
@@ -138,17 +140,6 @@ class LeasePermit(Permit):
     @override
     def disarm(self) -> None:
         self._lease.is_armed = False
-
-
-class UnleasedPermit(Permit):
-    """Permit for one motion, by the claim of the arm alone; the arm cannot be leased while it lasts."""
-
-    def __init__(self, device: str, require_unleased: Callable[[str], None]) -> None:
-        self._device, self._require_unleased = device, require_unleased
-
-    @override
-    def require(self) -> None:
-        self._require_unleased(self._device)
 
 
 Clock = Callable[[], float]  # [s]
@@ -246,7 +237,8 @@ class Leases:
             hint = "POST /api/v1/leases, arm the lease, and send its token as header Lease-Token"
             raise LeaseNeededError(f"{device}: moves for whoever has its lease; {hint}")
         else:
-            permit = UnleasedPermit(device, self.require_unleased)
+            # By the claim of the arm alone, which cannot be leased while that lasts.
+            permit = Permit(partial(self.require_unleased, device))
         permit.require()
         return permit
 

@@ -3,6 +3,7 @@
 import logging
 import threading
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -207,32 +208,25 @@ class RunSupervisor:
             control.stop()
         request = self._workspace.read_order()
         beat_s = BEAT_S if request is None else min(BEAT_S, request.options.heartbeat_s / BEATS_A_HEARTBEAT)
-        has_ended = False
-        while not has_ended:
+        while True:
             # Two ways to the same end: the run is asked to stop, and hears nothing of its owner any more.
             if (lost := self._permit.find_end_reason()) is not None:
                 self._stop_without_permit(lost)
             elif self._is_alive():
                 control.beat()
-            try:
+            with suppress(TimeoutError):
                 control.wait(beat_s)
-                has_ended = True
-            except TimeoutError:
-                continue
+                return
 
     def _stop_without_permit(self, why: str) -> None:
         """The leave to move has ended: stop, and say why; nothing is new where somebody has stopped the run already."""
         if not self._stop_requested.is_set():
             self._halt()
             _log.info("run %s is stopped: %s", self._workspace.folder.name, why)
-            self._report_step(f"stop: {why}")
-
-    def _report_step(self, step: str) -> None:
-        """Tell a step; a disk that takes none holds nothing up."""
-        try:
-            self._workspace.write_step(step)
-        except OSError:
-            _log.exception("a step of run %s could not be written", self._workspace.folder.name)
+            try:  # a disk that takes no step holds nothing up
+                self._workspace.write_step(f"stop: {why}")
+            except OSError:
+                _log.exception("a step of run %s could not be written", self._workspace.folder.name)
 
     def _handle_event(self, event: Mapping[str, Any]) -> None:
         state = RunState(event["state"])

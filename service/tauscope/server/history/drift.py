@@ -29,40 +29,37 @@ class NamedParameter:
 
 
 def extract_parameters(document: IdentificationDocument) -> tuple[NamedParameter, ...]:
-    """All but the shape constants K_v and δ, which describe the same curve as stiction and Stribeck friction."""
-    return (*_base(document), *_friction(document), *_rotors(document))
+    """All but the shape constants K_v and δ, which describe the same curve as stiction and Stribeck friction.
+
+    A value within three standard errors of zero counts as three standard errors.
+    """
+    rotors = ((f"rotor_inertia {each.joint}", each.joint, each.value, each.std, 0.0) for each in document.rotor_inertia)
+    return tuple(
+        NamedParameter(name, joint, value, std, max(abs(value), 3.0 * std, level))
+        for name, joint, value, std, level in (*_base(document), *_friction(document), *rotors)
+        if std is not None and std > 0.0
+    )
 
 
-def _base(document: IdentificationDocument) -> Iterator[NamedParameter]:
-    """Base parameters; a value within three standard errors of zero counts as three standard errors."""
+_Estimate = tuple[str, str, float, float | None, float]  # name, joint, value, its standard error, least scale
+
+
+def _base(document: IdentificationDocument) -> Iterator[_Estimate]:
     for each in document.base_parameters:
-        if each.std is None or each.std <= 0.0:
-            continue
         match = _LINK.search(next(iter(each.terms), ""))
         link = int(match.group()) if match else 1
         joint = document.joints[min(max(link, 1), len(document.joints)) - 1]
-        scale = max(abs(each.value), 3.0 * each.std)
-        yield NamedParameter(each.name, joint, each.value, each.std, scale)
+        yield each.name, joint, each.value, each.std, 0.0
 
 
-def _friction(document: IdentificationDocument) -> Iterator[NamedParameter]:
+def _friction(document: IdentificationDocument) -> Iterator[_Estimate]:
     """Friction terms; those that add to the same torque are measured by the joint's whole dry friction."""
     for each in document.friction:
         level = abs(each.stiction) + abs(each.stribeck)
         for term in FRICTION_TERMS:
-            std = each.std.get(term)
-            if std is None or std <= 0.0 or not each.identifiable.get(term, True):
-                continue
-            value = float(getattr(each, term))
-            scale = max(abs(value), 3.0 * std, 0.0 if term == "viscous" else level)
-            yield NamedParameter(f"{term} {each.joint}", each.joint, value, std, scale)
-
-
-def _rotors(document: IdentificationDocument) -> Iterator[NamedParameter]:
-    for each in document.rotor_inertia:
-        if each.std is not None and each.std > 0.0:
-            scale = max(abs(each.value), 3.0 * each.std)
-            yield NamedParameter(f"rotor_inertia {each.joint}", each.joint, each.value, each.std, scale)
+            if each.identifiable.get(term, True):
+                least = 0.0 if term == "viscous" else level
+                yield f"{term} {each.joint}", each.joint, float(getattr(each, term)), each.std.get(term), least
 
 
 @entry

@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field, FiniteFloat
 
 from tauscope.identification.result import IdentificationDocument, LinkEntry
+from tauscope.robot import LinkInertia, pseudo_inertia
 from tauscope.strict_model import ResultModel, entry
 
 Ratio = Annotated[FiniteFloat, Field(ge=1.0)]
@@ -87,7 +88,8 @@ def _excitation(document: IdentificationDocument, policy: ModelPolicy) -> Gate:
 def _structure(document: IdentificationDocument, active: IdentificationDocument) -> Gate:
     if document.joints != active.joints:
         return Gate("structure", False, "other joints than the active model's; activate it by hand if the arm changed")
-    if _names(document) != _names(active):
+    names, known = ([each.name for each in model.base_parameters] for model in (document, active))
+    if names != known:
         reason = "other base parameters than the active model's: the kinematics differ; if so, activate it by hand"
         return Gate("structure", False, reason)
     return Gate("structure", True, "the same joints and base parameters as the active model")
@@ -97,18 +99,10 @@ def is_physical(link: LinkEntry) -> bool:
     """Whether a link's pseudo-inertia [[½ tr(I) 1 − I, m s], [(m s)ᵀ, m]] has no negative eigenvalue."""
     i = link.inertia
     inertia = np.array([[i.xx, i.xy, i.xz], [i.xy, i.yy, i.yz], [i.xz, i.yz, i.zz]])
-    pseudo = np.empty((4, 4))
-    pseudo[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    pseudo[:3, 3] = pseudo[3, :3] = link.first_moment
-    pseudo[3, 3] = link.mass
-    eigenvalues = np.linalg.eigvalsh(pseudo)
+    eigenvalues = np.linalg.eigvalsh(pseudo_inertia(LinkInertia(link.mass, np.array(link.first_moment), inertia)))
     return bool(eigenvalues[0] >= -1e-6 * max(eigenvalues[-1], 1e-12))
 
 
 def _ratios(rms: Sequence[float], floor: Sequence[float], joints: Sequence[str]) -> Iterator[tuple[float, str]]:
     for value, reference, joint in zip(rms, floor, joints, strict=True):
         yield (value / reference if reference > 0.0 else (1.0 if value == 0.0 else float("inf"))), joint
-
-
-def _names(document: IdentificationDocument) -> list[str]:
-    return [each.name for each in document.base_parameters]

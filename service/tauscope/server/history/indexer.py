@@ -5,6 +5,7 @@ import logging
 import os
 import threading
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -42,11 +43,9 @@ def stamp(kind: str, folder: Path) -> str:
     """What changes when the state of an item does."""
     names = ("control/run.json", "run.json") if kind == "run" else ("state.json",)
     for name in names:
-        try:
+        with suppress(OSError):
             status = os.stat(folder / name)
-        except OSError:
-            continue
-        return f"{status.st_mtime_ns}-{status.st_size}"
+            return f"{status.st_mtime_ns}-{status.st_size}"
     return "none"
 
 

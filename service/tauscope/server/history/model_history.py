@@ -14,9 +14,9 @@ from tauscope.identification import IdentificationDocument
 from tauscope.robot.messages import nearest, shown
 from tauscope.server.history.gates import Gate, ModelPolicy
 from tauscope.server.history.model_judgement import Candidate, choose, judge
-from tauscope.server.store.database.database import Database, read_row
+from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.tables import Item, Model, ModelEvent, Robot, RobotPolicy
-from tauscope.strict_model import entry
+from tauscope.strict_model import entry, take_fields
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,7 @@ class ModelHistory:
             .where(Item.robot_id.is_not(None), Item.identifier.not_in(judged))
             .order_by(Item.created)
         )
-        with self._database.reading() as session:
-            return list(session.scalars(query))
+        return self._database.fetch(query)
 
     def consider(self, candidate: Candidate, now: datetime) -> ModelEntry:
         """Judge an identification. Raises NotFoundError without its robot, IntegrityError if it was judged already."""
@@ -82,8 +81,7 @@ class ModelHistory:
 
     def list_protected(self) -> frozenset[str]:
         """Identifiers of the models that are active, or that drift is counted from."""
-        with self._database.reading() as session:
-            return frozenset(session.scalars(select(Model.identifier).where(Model.is_active | Model.is_reference)))
+        return frozenset(self._database.fetch(select(Model.identifier).where(Model.is_active | Model.is_reference)))
 
     def find(self, identifier: str) -> ModelEntry:
         with self._database.reading() as session:
@@ -99,9 +97,7 @@ class ModelHistory:
 
     def active(self, robot: str) -> ModelEntry | None:
         query = select(Model).join(Robot).where(Robot.name == robot, Model.is_active)
-        with self._database.reading() as session:
-            model = session.scalar(query)
-            return None if model is None else _entry(model)
+        return next(map(_entry, self._database.fetch(query)), None)
 
     def active_and_reference(self, site: str) -> dict[str, tuple[str, str]]:
         """Identifiers of the active model and of the one that drift is counted from, by name of the robot."""
@@ -118,8 +114,7 @@ class ModelHistory:
         query = select(Model).join(Robot).order_by(Model.created.desc(), Model.id.desc()).limit(limit)
         if robot is not None:
             query = query.where(Robot.name == robot)
-        with self._database.reading() as session:
-            return [_entry(model) for model in session.scalars(query)]
+        return [_entry(model) for model in self._database.fetch(query)]
 
     def documents(self, robot: str) -> list[tuple[str, datetime, IdentificationDocument]]:
         """Models that were ever active, the oldest first. Raises NotFoundError if there is no such robot."""
@@ -146,8 +141,7 @@ class ModelHistory:
             query = query.where(Robot.name == robot)
         if only_open:
             query = query.where(ModelEvent.closed.is_(None))
-        with self._database.reading() as session:
-            return [_event(event) for event in session.scalars(query)]
+        return [_event(event) for event in self._database.fetch(query)]
 
     def acknowledge(self, number: int, note: str, now: datetime) -> ModelEventEntry:
         """Close an event, unless it is closed. Raises NotFoundError if there is no such event."""
@@ -185,8 +179,8 @@ def _model(session: Session, identifier: str) -> Model:
 
 def _entry(model: Model) -> ModelEntry:
     gates = tuple(Gate(**gate) for gate in model.gates)
-    return read_row(ModelEntry, model, robot=model.robot.name, gates=gates)
+    return take_fields(ModelEntry, model, robot=model.robot.name, gates=gates)
 
 
 def _event(event: ModelEvent) -> ModelEventEntry:
-    return read_row(ModelEventEntry, event, number=event.id, robot=event.robot.name)
+    return take_fields(ModelEventEntry, event, number=event.id, robot=event.robot.name)

@@ -80,8 +80,7 @@ def sweep(
     """Remove what a rule lets go, as the routes do. Raises StoreError, before anything goes, or OSError."""
     plan = plan_removal(indexer, history, recordings, rule, utc_now())
     gone = remove(plan, removers, recordings, indexer)
-    for kind, name in [
-        *((each.kind, each.identifier) for each in gone.items),
-        *(("recording", e) for e in gone.recordings),
-    ]:
-        on_removed(kind, name)
+    for each in gone.items:
+        on_removed(each.kind, each.identifier)
+    for name in gone.recordings:
+        on_removed("recording", name)

@@ -35,14 +35,15 @@ RECORDINGS_EXAMPLE: tuple[str, Any] = (
 )
 
 
+def name_field(what: str, part: str) -> Any:
+    words = f"names of {what}: files of this form, or on the server; null: all files sent as part `{part}`"
+    return Field(default=None, description=words)
+
+
 class IdentificationRequest(RecordingsRequest):
     """What is to be identified."""
 
-    recordings: Names | None = Field(
-        default=None,
-        description="names of the recordings that the model is made from: files of this form, or on the server;"
-        " null: all files sent as part `recordings`",
-    )
+    recordings: Names | None = name_field("the recordings that the model is made from", "recordings")
     held_out: Names | None = Field(default=None, description="recordings that judge it; null: every part `held_out`")
     options: IdentificationOptions = Field(default=IdentificationOptions(), description="how it is identified")
 
@@ -77,7 +78,6 @@ class IdentificationAnswer(JobAnswer):
 
 IDENTIFICATIONS = QueuedTask(
     noun="an identification",
-    plural="identifications",
     workspace=IdentificationWorkspace,
     models=(IdentificationRequest, IdentificationAnswer),
     examples=IDENTIFICATION_EXAMPLES,
@@ -108,11 +108,7 @@ IDENTIFICATIONS = QueuedTask(
 class DiagnosisRequest(RecordingsRequest):
     """What is to be diagnosed."""
 
-    recordings: Names | None = Field(
-        default=None,
-        description="names of the recordings that are to be explained: files of this form, or on the server; null: all"
-        " files sent as part `recordings`",
-    )
+    recordings: Names | None = name_field("the recordings that are to be explained", "recordings")
     held_out: Names | None = Field(default=None, description="recordings that confirm findings; null: all sent")
     simulated: Names | None = Field(default=None, description="recordings of your own simulator; null: all sent")
     model: str | dict[str, Any] | None = Field(
@@ -198,7 +194,6 @@ def keep_earlier_model(handed: Submission[DiagnosisRequest]) -> str | None:
 
 DIAGNOSES = QueuedTask(
     noun="a diagnosis",
-    plural="diagnoses",
     workspace=DiagnosisWorkspace,
     models=(DiagnosisRequest, DiagnosisAnswer),
     examples=DIAGNOSIS_EXAMPLES,
@@ -255,11 +250,7 @@ DIAGNOSES = QueuedTask(
 class RolloutRequest(RecordingsRequest):
     """What is to be rolled out."""
 
-    recordings: Names | None = Field(
-        default=None,
-        description="names of recordings with commands, or with torque: files of this form, or on the server; null: all"
-        " files sent as part `recordings`",
-    )
+    recordings: Names | None = name_field("recordings with commands, or with torque", "recordings")
     refine: Names | None = Field(
         default=None,
         description="names of recordings with commands by which the model is refined; null: all files sent as part"
@@ -302,7 +293,6 @@ def find_model(services: Services, identifier: str) -> TaskWorkspace[Any]:
 
 ROLLOUTS = QueuedTask(
     noun="a rollout",
-    plural="rollouts",
     workspace=RolloutWorkspace,
     models=(RolloutRequest, RolloutAnswer),
     examples=ROLLOUT_EXAMPLES,

@@ -71,15 +71,9 @@ def describe_job(workspace: Workspace, here: str) -> dict[str, Any]:
     identifier, record = workspace.folder.name, workspace.read_record()
     if record is None:
         return describe_damaged(identifier, here)
-    return {
-        "id": identifier,
-        "state": record.state,
-        "step": workspace.read_step() if record.state is JobState.RUNNING else None,
-        "created": record.created,
-        "started": record.started,
-        "ended": record.ended,
-        "problem": convert_problem(record.problem, here),
-    }
+    step = workspace.read_step() if record.state is JobState.RUNNING else None
+    told = record.model_dump(include={"state", "created", "started", "ended"})
+    return {**told, "id": identifier, "step": step, "problem": convert_problem(record.problem, here)}
 
 
 def describe_damaged(identifier: str, here: str) -> dict[str, Any]:

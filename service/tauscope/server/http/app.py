@@ -35,7 +35,7 @@ from tauscope.server.http import (
 )
 from tauscope.server.http.answers import ROOT
 from tauscope.server.http.openapi import install_openapi
-from tauscope.server.http.problem_handlers import collect_methods, install_problem_handlers, require_known_query
+from tauscope.server.http.problem_handlers import install_problem_handlers, require_known_query
 from tauscope.server.http.protection import BodyLimit, ConcurrencyLimiter, OriginCheck, RequestLog, ResponseProtection
 from tauscope.server.http.readiness import notify_systemd
 from tauscope.server.http.repeated_requests import IdempotentRequests
@@ -82,7 +82,6 @@ def create_app(settings: Settings, executor: Executor | None = None, start: Star
         app.include_router(router, prefix=ROOT, dependencies=[Depends(require_known_query)])
     for router in PAGES:
         app.include_router(router)
-    app.state.methods = collect_methods([*((ROOT, router) for router in VERBS), *(("", router) for router in PAGES)])
     install_problem_handlers(app)
     install_openapi(app)
     # The last one added is the first to see a request.
@@ -130,9 +129,7 @@ def hide_secrets(_logger: Any, _method: str, event: MutableMapping[str, Any]) ->
     """An event without anything that looks like a key or a token."""
     event.pop("color_message", None)  # uvicorn's, for terminals
     for name, value in event.items():
-        if isinstance(value, str):
-            event[name] = _SECRET.sub(_HIDDEN, value)
-        elif not isinstance(value, int | float | bool | None):
+        if not isinstance(value, int | float | bool | None):
             event[name] = _SECRET.sub(_HIDDEN, str(value))
     return event
 

@@ -97,11 +97,9 @@ def _steps(services: Services, order: CampaignOrder, made: CampaignLinks) -> Ite
         ("diagnose", DIAGNOSES, made.diagnosis, order.diagnosis is not None),
     ]
     for name, resource, identifier, is_wanted in steps:
-        if is_wanted and identifier is None:
-            yield CampaignStepAnswer(name=name, state="waiting")
-        elif is_wanted and identifier is not None:
-            state = _state(services, resource, identifier)
-            yield CampaignStepAnswer(name=name, state=state, link=resource.path(identifier))
+        if is_wanted:
+            state = "waiting" if identifier is None else _state(services, resource, identifier)
+            yield CampaignStepAnswer(name=name, state=state, link=identifier and resource.path(identifier))
 
 
 def _state(services: Services, resource: Resource, identifier: str) -> str:
@@ -150,7 +148,6 @@ class Campaigns(MovingResource):
 
 CAMPAIGNS = Campaigns(
     noun="a campaign",
-    plural="campaigns",
     models=(CampaignRequest, CampaignAnswer),
     workspace=CampaignWorkspace,
     manager=lambda services: services.campaigns,

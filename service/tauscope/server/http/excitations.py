@@ -15,7 +15,7 @@ from tauscope.server.http.services import ServicesDep
 from tauscope.server.http.tasks.queued import JobDocument, QueuedTask
 from tauscope.server.http.tasks.submission import EXAMPLE_ROBOT, RobotRequest
 from tauscope.server.queue.analyses import ExcitationWorkspace, write_trajectory_piece
-from tauscope.server.queue.job_folder import read_bytes
+from tauscope.server.store.files import read_bytes
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.trajectory.csv_format import PIECE_ROWS
 
@@ -53,7 +53,6 @@ Rate = Annotated[float, Query(gt=0.0, le=10_000.0, description="samples a second
 
 EXCITATIONS = QueuedTask(
     noun="an excitation",
-    plural="excitations",
     workspace=ExcitationWorkspace,
     models=(ExcitationRequest, ExcitationAnswer),
     examples=EXAMPLES,

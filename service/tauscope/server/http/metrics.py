@@ -1,11 +1,13 @@
 """Prometheus metrics: requests, jobs, runs, lateness of the control loops, and drift of models."""
 
+import math
 import threading
 import time
 from collections import Counter as Tally
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor, Future
 from functools import partial
+from itertools import accumulate
 from typing import Any
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
@@ -153,8 +155,7 @@ class TimedExecutor(Executor):
 
 def _cumulative(counts: Tally[float]) -> list[tuple[str, float]]:
     """Counts at or below each edge, as Prometheus wants them; the last edge is infinity."""
-    total, buckets = 0, []
-    for edge in sorted({*counts, float("inf")}):
-        total += counts[edge]
-        buckets.append(("+Inf" if edge == float("inf") else repr(edge), float(total)))
-    return buckets
+    edges = sorted({*counts, math.inf})
+    totals = accumulate(counts[edge] for edge in edges)
+    names = ("+Inf" if edge == math.inf else repr(edge) for edge in edges)
+    return list(zip(names, map(float, totals), strict=True))

@@ -34,7 +34,9 @@ SCHEMAS = "#/components/schemas/"
 def share_parts(document: dict[str, Any]) -> None:
     """Refer to parts that repeat, and leave out keywords that say nothing more."""
     _refer_to_formats(document)
-    _drop_unused(document)
+    schemas = document["components"]["schemas"]
+    used = _find_schemas(schemas, document["paths"])
+    document["components"]["schemas"] = {name: schema for name, schema in schemas.items() if name in used}
     _drop_descriptions_of_answers(document)
     for node in _schema_nodes(document):
         _shorten(node)
@@ -62,12 +64,6 @@ def _refer_to_formats(document: dict[str, Any]) -> None:
                 if address is not None:
                     file = {"type": "object", "additionalProperties": True}
                     content["schema"] = {**file, "externalDocs": {"url": address}}
-
-
-def _drop_unused(document: dict[str, Any]) -> None:
-    schemas = document["components"]["schemas"]
-    used = _find_schemas(schemas, document["paths"])
-    document["components"]["schemas"] = {name: schema for name, schema in schemas.items() if name in used}
 
 
 def _drop_descriptions_of_answers(document: dict[str, Any]) -> None:
@@ -177,12 +173,8 @@ def _refer(
 
 
 def merge_problems(answers: dict[str, Any], status: str, answer: dict[str, Any]) -> None:
-    present = answers.setdefault(status, answer)
-    if present is not answer:
-        examples = present["content"][MEDIA_TYPE]["examples"]
-        examples |= {
-            code: each for code, each in answer["content"][MEDIA_TYPE]["examples"].items() if code not in examples
-        }
+    present = answers.setdefault(status, answer)["content"][MEDIA_TYPE]
+    present["examples"] = {**answer["content"][MEDIA_TYPE]["examples"], **present["examples"]}
 
 
 Slot = tuple[Any, Any]  # a list or an object, and the place in it that holds a part

@@ -1,30 +1,22 @@
 """Which problem each exception becomes, and requests that no route foresees: methods and query parameters."""
 
 import logging
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from http import HTTPStatus
 
-from fastapi import APIRouter, FastAPI, Request, Response
-from fastapi.dependencies.models import Dependant
+from fastapi import FastAPI, Request, Response, params
+from fastapi.dependencies.utils import get_flat_params
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
-from starlette.routing import Route, compile_path
+from starlette.routing import Match
 
 from tauscope.errors import TauscopeError, one_line
 from tauscope.files import is_disk_full
 from tauscope.robot.messages import nearest, shown
 from tauscope.server.auth.keys import is_stop
 from tauscope.server.control.leases import BusyError, LeasedError, LeaseLostError, LeaseNeededError, NotArmedError
-from tauscope.server.problems import (
-    FieldError,
-    ProblemError,
-    field_errors,
-    make_problem,
-    problem_answer,
-    summarise,
-)
+from tauscope.server.problems import FieldError, ProblemError, field_errors, make_problem, problem_answer, summarise
 from tauscope.server.queue.queue import QueueFullError
 from tauscope.server.store.recordings import NameTakenError
 
@@ -33,32 +25,14 @@ async def require_known_query(request: Request) -> None:
     """Raises ProblemError for a query parameter that the route does not know; a stop is never refused."""
     if not request.query_params or is_stop(request.method, request.url.path):
         return
-    known = set(_find_names(request.scope["route"].dependant))
+    fields = get_flat_params(request.scope["route"].dependant)
+    known = {field.alias for field in fields if isinstance(field.field_info, params.Query)}
     unknown = sorted(set(request.query_params) - known)
     if unknown:
         hint = nearest(unknown[0], known) if known else "this address takes none"
         text = one_line(f"query parameter {shown(unknown[0])} is not known here; {hint}")
         errors = [FieldError(field=one_line(f"query.{name}")[:200], message="not known here") for name in unknown[:100]]
         raise ProblemError("invalid-request", text, errors=errors)
-
-
-def _find_names(dependant: Dependant) -> Iterator[str]:
-    yield from (field.alias for field in dependant.query_params)
-    for other in dependant.dependencies:
-        yield from _find_names(other)
-
-
-Methods = Sequence[tuple[re.Pattern[str], frozenset[str]]]  # for each route the pattern of its path, and its methods
-
-
-def collect_methods(routers: Iterable[tuple[str, APIRouter]]) -> Methods:
-    """The methods of all routes; `routers` with the prefix of their paths."""
-    return tuple(
-        (compile_path(prefix + route.path)[0], frozenset(route.methods or ()))
-        for prefix, router in routers
-        for route in router.routes
-        if isinstance(route, Route)
-    )
 
 
 _log = logging.getLogger("tauscope.api")
@@ -72,32 +46,31 @@ _OF_ERROR: Mapping[type[Exception], str] = {
     LeaseLostError: "lease-lost",
     NotArmedError: "not-armed",
 }
+_METHODS = ("DELETE", "GET", "HEAD", "PATCH", "POST", "PUT")
 _OF_STATUS: Mapping[int, str] = {404: "not-found", 405: "method-not-allowed", 413: "limit-exceeded", 415: "media-type"}
 
 
 def install_problem_handlers(app: FastAPI) -> None:
-    app.add_exception_handler(TauscopeError, _tauscope_error)
-    app.add_exception_handler(RequestValidationError, _validation_error)
-    app.add_exception_handler(HTTPException, _http_exception)
-    app.add_exception_handler(OSError, _system_error)
-    app.add_exception_handler(ClientDisconnect, _client_gone)
+    app.exception_handler(TauscopeError)(_tauscope_error)
+    app.exception_handler(RequestValidationError)(_validation_error)
+    app.exception_handler(HTTPException)(_http_exception)
+    app.exception_handler(OSError)(_system_error)
+    app.exception_handler(ClientDisconnect)(_client_gone)
 
 
-async def _tauscope_error(request: Request, error: Exception) -> Response:
-    code = _OF_ERROR.get(type(error)) or getattr(error, "code", "internal")
+async def _tauscope_error(request: Request, error: TauscopeError) -> Response:
+    code = _OF_ERROR.get(type(error), error.code)
     headers = {"Retry-After": "10"} if code in ("queue-full", "busy") else None
     return problem_answer(make_problem(code, str(error), request.url.path), headers)
 
 
-async def _validation_error(request: Request, error: Exception) -> Response:
-    assert isinstance(error, RequestValidationError)  # noqa: S101 - Starlette looks handlers up by type
+async def _validation_error(request: Request, error: RequestValidationError) -> Response:
     fields = field_errors(error.errors())
     return problem_answer(make_problem("invalid-request", summarise(fields), request.url.path, fields))
 
 
-async def _http_exception(request: Request, error: Exception) -> Response:
+async def _http_exception(request: Request, error: HTTPException) -> Response:
     """A problem that only a service meets: one of ours, or one of the framework's."""
-    assert isinstance(error, HTTPException)  # noqa: S101 - Starlette looks handlers up by type
     path = request.url.path
     if isinstance(error, ProblemError):
         return problem_answer(make_problem(error.code, error.detail, path, error.errors), error.headers)
@@ -107,15 +80,19 @@ async def _http_exception(request: Request, error: Exception) -> Response:
     }.get(error.status_code, error.detail)
     headers = dict(error.headers or {})
     if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
-        headers["Allow"] = ", ".join(
-            sorted({each for rule, known in request.app.state.methods if rule.match(path) for each in known})
-        )
+        headers["Allow"] = ", ".join(each for each in _METHODS if _is_known(request, each))
     return problem_answer(make_problem(_OF_STATUS.get(error.status_code, "bad-request"), detail, path), headers)
 
 
-async def _system_error(request: Request, error: Exception) -> Response:
+def _is_known(request: Request, method: str) -> bool:
+    """Whether a route answers this method at the address of a request."""
+    scope = {**request.scope, "method": method}
+    return any(route.matches(scope)[0] is Match.FULL for route in request.app.routes)
+
+
+async def _system_error(request: Request, error: OSError) -> Response:
     """A full disk is said; any other failure of the system is a fault to look into."""
-    if isinstance(error, OSError) and is_disk_full(error):
+    if is_disk_full(error):
         _log.error("the disk is full")
         text = "the service's disk is full; remove recordings or identifications"
         return problem_answer(make_problem("storage-full", text, request.url.path))

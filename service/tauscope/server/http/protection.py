@@ -5,6 +5,7 @@ import logging
 import time
 import uuid
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from typing import cast
 from urllib.parse import urlsplit
 
@@ -238,27 +239,16 @@ class ConcurrencyLimiter(HttpMiddleware):
             text = "the service is ending; ask again when it has started"
             problem = ProblemError("not-ready", text, headers={"Retry-After": "5"})
             return await self.refuse(problem, scope, receive, send)
-        slot = _Slot(slots, self._slot_timeout_s)
+        slot = ExitStack()  # let go of once, however often that is asked for
+        slot.callback(slots.release)
+        timer = asyncio.get_running_loop().call_later(self._slot_timeout_s, slot.close)
 
         async def send_and_free_slot(message: Message) -> None:
-            slot.end()
+            slot.close()
             await send(message)
 
         try:
             await self.app(scope, receive, send_and_free_slot)
         finally:
-            slot.end()
-
-
-class _Slot:
-    """One reader's slot; ends once, however often that is said."""
-
-    def __init__(self, slots: asyncio.Semaphore, longest_s: float) -> None:
-        self._slots, self._has_ended = slots, False
-        self._timer = asyncio.get_running_loop().call_later(longest_s, self.end)
-
-    def end(self) -> None:
-        if not self._has_ended:
-            self._has_ended = True
-            self._timer.cancel()
-            self._slots.release()
+            timer.cancel()
+            slot.close()

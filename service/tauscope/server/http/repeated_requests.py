@@ -7,6 +7,7 @@ import re
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import cast
 
@@ -75,11 +76,9 @@ class StoredAnswers:
 
     def _tidy(self) -> None:
         for entry in self._folder.iterdir():
-            try:
+            with suppress(OSError):
                 if self._clock() - entry.stat().st_mtime > LIFE_S:
                     entry.unlink(missing_ok=True)
-            except OSError:
-                continue
 
 
 class Fingerprint:
@@ -128,7 +127,7 @@ class IdempotentRequests(HttpMiddleware):
         if not _KEY.fullmatch(key):
             text = f"header {HEADER}: give 1 to {LONGEST_KEY} characters without blanks, for example a UUID"
             return await self.refuse(ProblemError("invalid-request", text), scope, receive, send)
-        store = _answers_of(scope)
+        store = cast(StoredAnswers, scope["app"].state.services.answers)
         # Nobody meets another caller's answers.
         words = (find_caller(scope).key or "local", scope["path"], key)
         name = hashlib.sha256("\n".join(words).encode()).hexdigest()
@@ -142,12 +141,13 @@ class IdempotentRequests(HttpMiddleware):
             return await (await _repeat(scope, receive, store, name, is_underway))(scope, receive, send)
         self._underway.add(name)
         try:
-            await self._answer_first(scope, receive, send, name)
+            await self._answer_first(scope, receive, send, store, name)
         finally:
             self._underway.discard(name)
 
-    async def _answer_first(self, scope: AsgiScope, receive: Receive, send: Send, name: str) -> None:
-        store = _answers_of(scope)
+    async def _answer_first(
+        self, scope: AsgiScope, receive: Receive, send: Send, store: StoredAnswers, name: str
+    ) -> None:
         fingerprint = Fingerprint(Headers(scope=scope).get("content-type", ""))
         answer = _Captured()
         await self.app(scope, _count_body(receive, fingerprint), answer.take)
@@ -165,10 +165,6 @@ class IdempotentRequests(HttpMiddleware):
 def is_repeatable(path: str) -> bool:
     """Whether a POST to a path creates or moves something, and is done once for an Idempotency-Key."""
     return _REPEATABLE.fullmatch(path) is not None
-
-
-def _answers_of(scope: AsgiScope) -> StoredAnswers:
-    return cast(StoredAnswers, scope["app"].state.services.answers)
 
 
 class _Captured:

@@ -60,13 +60,10 @@ Version = Annotated[str, Path(description="version of the robot", pattern=VERSIO
 )
 async def keep_robot_version(request: Request, response: Response, services: ServicesDep) -> RobotVersionAnswer:
     """The same content is the same version, kept once. Requests name it as `robot: {version: …}`."""
-    folder = await run_in_threadpool(services.robots.stage)
-    try:
+    async with contextmanager_in_threadpool(services.robots.stage()) as folder:
         file_name = await _receive_robot(request, services, folder)
         robot = await services.reading.call(request, read_received_robot, folder, file_name)
         kept, is_new = await run_in_threadpool(services.robots.keep, folder, file_name, robot.name)
-    finally:
-        await run_in_threadpool(services.robots.discard, folder)
     answer = RobotVersionAnswer.of(kept)
     response.status_code = 201 if is_new else 200
     response.headers["Location"] = answer.link

@@ -20,13 +20,7 @@ from tauscope.runtime.record import RunRecord
 from tauscope.runtime.states import RunState
 from tauscope.runtime.timing import RealTime, Timing
 from tauscope.server.control.leases import Permit
-from tauscope.server.control.run import (
-    RunRequestRecord,
-    RunWorkspace,
-    await_design,
-    ready_motion,
-    take_trajectory,
-)
+from tauscope.server.control.run import RunRequestRecord, RunWorkspace, await_design, ready_motion, take_trajectory
 from tauscope.server.control.run_manager import run_recording_name
 from tauscope.server.http.answers import AnswerModel, Identifier, MotionLinks, convert_problem, describe_damaged
 from tauscope.server.http.bodies import PartRule, file_answer, to_json_text
@@ -157,13 +151,6 @@ def require_recording(services: Services, identifier: str, format_: RecordingFor
     return workspace
 
 
-def _recording(services: Services, identifier: str, record: RunRecord) -> RunRecordingAnswer | None:
-    left, name = record.recording, run_recording_name(identifier)
-    if left is None:
-        return None
-    return RunRecordingAnswer.describe(left, name=name if services.recordings.holds(name) else None)
-
-
 def _links(here: str, excitation: str | None, record: RunRecord | None, workspace: RunWorkspace) -> RunLinks:
     has_ended = record is not None and record.state.is_end
     made: dict[RecordingFormat, str] = {
@@ -238,6 +225,8 @@ class Runs(MovingResource):
         if record is None or request is None:
             return RunAnswer(**describe_damaged(identifier, here), links=_links(here, None, None, workspace))
         goes_on = live is not None and not record.state.is_end
+        left, name = record.recording, run_recording_name(identifier)
+        kept = name if services.recordings.holds(name) else None
         excitation = request.excitation and EXCITATIONS.path(request.excitation)
         return RunAnswer.describe(
             record,
@@ -251,7 +240,7 @@ class Runs(MovingResource):
             options=request.options,
             campaign=request.campaign,
             problem=convert_problem(workspace.problem(), here),
-            recording=_recording(services, identifier, record),
+            recording=None if left is None else RunRecordingAnswer.describe(left, name=kept),
             links=_links(here, excitation, record, workspace),
         )
 
@@ -283,7 +272,6 @@ class Runs(MovingResource):
 
 RUNS = Runs(
     noun="a run",
-    plural="runs",
     models=(RunRequest, RunAnswer),
     workspace=RunWorkspace,
     manager=lambda services: services.runs,

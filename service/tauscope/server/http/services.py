@@ -5,7 +5,7 @@ import shutil
 import threading
 from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import Executor
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import timedelta
 from functools import partial
@@ -118,30 +118,32 @@ def open_services(
     """Take the data folder; end all work on leaving. Raises TauscopeError if the folder or database is unusable."""
     settings.data_folder.mkdir(0o700, parents=True, exist_ok=True)
     access = _open_access(settings)
-    lock = FolderLock(settings.data_folder)
-    try:
+    with ExitStack() as stack:
+        stack.callback(FolderLock(settings.data_folder).release)
         site, database = site_identifier(settings.data_folder), Database(settings.database_address)
-    except BaseException:
-        lock.release()
-        raise
-    readers = open_readers(settings)
-    services = _assemble(settings, access, database, site, executor, readers, start)
-    drift = DriftMonitor(services.models.history, site)
-    _watch(services, drift)
-    housekeeping = Housekeeping(
-        [services.jobs.settle, services.runs.settle, services.index.sync, services.models.judge_new, drift.look]
-    )
-    keys = Housekeeping([services.access.ring.look], CHECK_S)
-    clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
-    filling = threading.Thread(target=_fill_index, args=(services,), name="index", daemon=True)
-    filling.start()
-    filling.join(FILLING_S)
-    housekeeping.start()
-    pruning = Housekeeping(_retention(services), PRUNING_S)
-    pruning.start()
-    if settings.fires_schedules:
-        clock.start()
-    try:
+        stack.callback(database.close)
+        readers = open_readers(settings)
+        services = _assemble(settings, access, database, site, executor, readers, start)
+        drift = DriftMonitor(services.models.history, site)
+        _watch(services, drift)
+        housekeeping = Housekeeping(
+            [services.jobs.settle, services.runs.settle, services.index.sync, services.models.judge_new, drift.look]
+        )
+        keys = Housekeeping([services.access.ring.look], CHECK_S)
+        clock = Housekeeping([services.schedules.tick])  # apart: an interlock may take its time
+        pruning = Housekeeping(_retention(services), PRUNING_S)
+        filling = threading.Thread(target=_fill_index, args=(services,), name="index", daemon=True)
+        filling.start()
+        filling.join(FILLING_S)
+        housekeeping.start()
+        pruning.start()
+        if settings.fires_schedules:
+            clock.start()
+        # Closed from the last one to the first.
+        for close in (housekeeping.close, filling.join, services.index.close):
+            stack.callback(close)
+        stack.callback(readers.shutdown, cancel_futures=True)
+        stack.callback(services.jobs.close)
         with services.audit.writing():
             services.audit.note("service", "began")
             keys.start()
@@ -149,20 +151,9 @@ def open_services(
                 yield services
             finally:
                 services.begin_to_close()
-                keys.close()
-                clock.close()
-                pruning.close()
-                services.runs.close()
-                services.campaigns.close()
+                for part in (keys, clock, pruning, services.runs, services.campaigns):
+                    part.close()
                 services.audit.note("service", "ended")
-    finally:
-        services.jobs.close()
-        readers.shutdown(wait=True, cancel_futures=True)
-        services.index.close()
-        filling.join()
-        housekeeping.close()
-        database.close()
-        lock.release()
 
 
 FILLING_S = 1.0
@@ -196,14 +187,18 @@ def _assemble(
         for noun, kind in TASKS.items()
     }
     pool = executor or open_executor(settings.workers, deadline_s=settings.job_timeout_s)
-    timed = TimedExecutor(pool, metrics.job_seconds)
     bounds: dict[str, Any] = {"slots": settings.workers, "most_waiting": settings.max_waiting}
     if isinstance(pool, ClusterExecutor):  # it comes and goes, and so do its workers
         bounds |= {"slots": lambda: pool.width, "is_there": pool.is_there}
+    timed = TimedExecutor(pool, metrics.job_seconds)
     jobs = JobQueue([*kinds.values()], timed, most_each=settings.max_jobs_per_caller, **bounds)
     audit = AuditTrail(AuditLog(settings.data_folder))
     claims, closing = DeviceClaims(settings.max_arms), threading.Event()
-    leases = Leases(claims, on_end=partial(_note_end, audit))
+
+    def note_end(lease: Lease, why: str) -> None:
+        audit.note("service", "lease ended", subject=lease.id, device=lease.device, holder=lease.holder, reason=why)
+
+    leases = Leases(claims, on_end=note_end)
     start = start or partial(start_control, sim_socket=settings.sim_socket)
     runs = RunManager(items["run"], recordings, start, claims, heartbeat.is_alive, metrics.run_ended)
     dependencies = CampaignDependencies(jobs, kinds, runs, recordings)
@@ -222,8 +217,6 @@ def _assemble(
         "clock": Clock().check,
         "audit log": lambda: f"{audit.lost} entries of the audit log were lost" if audit.lost else None,
     }
-    models = ModelRegistry(ModelHistory(database), site, items)
-    index = open_index(Index(database, site), items, recordings, settings.data_folder.name)
     # What a schedule moves has no lease: it waits for its next time where somebody has one.
     repeater = Repeater(dependencies, campaigns, partial(leases.permit, token=None, owner="schedule", is_needed=False))
     return Services(
@@ -245,15 +238,14 @@ def _assemble(
         closing=closing,
         feeds=EventFeeds(closing),
         heartbeat=heartbeat,
-        index=index,
-        models=models,
+        index=open_index(Index(database, site), items, recordings, settings.data_folder.name),
+        models=ModelRegistry(ModelHistory(database), site, items),
         schedules=Scheduler(ScheduleRepository(database, site, new_boot()), repeater, settings.data_folder),
     )
 
 
 def open_readers(settings: Settings) -> Executor:
-    bounds = {"deadline_s": settings.reading_timeout_s, "memory_bytes": settings.reading_memory_bytes}
-    return WorkerPool(WIDTH, **bounds)
+    return WorkerPool(WIDTH, deadline_s=settings.reading_timeout_s, memory_bytes=settings.reading_memory_bytes)
 
 
 def _retention(services: Services) -> list[Callable[[], object]]:
@@ -289,10 +281,6 @@ def _watch(services: Services, drift: DriftMonitor) -> None:
     metrics.watch("tauscope_leases", "Leases that hold", lambda: len(services.leases.active()))
     metrics.watch("tauscope_audit_lost", "Entries that the audit log did not take", lambda: services.audit.lost)
     metrics.watch("tauscope_disk_free_bytes", "Room in the data folder", lambda: shutil.disk_usage(folder).free)
-
-
-def _note_end(audit: AuditTrail, lease: Lease, why: str) -> None:
-    audit.note("service", "lease ended", subject=lease.id, device=lease.device, holder=lease.holder, reason=why)
 
 
 def _open_access(settings: Settings) -> Access:

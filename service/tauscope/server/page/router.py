@@ -54,16 +54,12 @@ MOTIONS = {"example-train.csv": (1, 1.5), "example-held-out.csv": (2, 1.1)}
 
 @cache
 def example_files() -> dict[str, bytes]:
-    robot = _robot()
-    made = {name: _recording(robot, reach, np.random.default_rng(seed)) for name, (seed, reach) in MOTIONS.items()}
-    return {"example-arm.yaml": ROBOT.encode(), **made}
-
-
-def _robot() -> Robot:
     with TemporaryDirectory(prefix="tauscope-example-") as folder:
         path = Path(folder) / "example-arm.yaml"
         path.write_text(ROBOT, encoding="utf-8")
-        return read_robot(path)
+        robot = read_robot(path)
+    made = {name: _recording(robot, reach, np.random.default_rng(seed)) for name, (seed, reach) in MOTIONS.items()}
+    return {"example-arm.yaml": ROBOT.encode(), **made}
 
 
 def _recording(robot: Robot, reach: float, rng: np.random.Generator) -> bytes:

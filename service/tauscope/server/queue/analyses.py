@@ -9,6 +9,7 @@ from tauscope.errors import LimitExceededError, NotFoundError
 from tauscope.export.formats import CODE_FILES, EXPORT_FILES
 from tauscope.robot import read_robot
 from tauscope.server.queue.task_job import TRAJECTORY, OrderedRecording, TaskOrder, TaskWorkspace
+from tauscope.server.store.files import read_bytes
 from tauscope.tasks import design_excitation, diagnose, identify, rollout
 from tauscope.tasks.design_excitation import ExcitationDesignOptions
 from tauscope.tasks.diagnose import DiagnosisOptions
@@ -110,11 +111,8 @@ HEAVY = ("diagnosis", "rollout")  # their work takes minutes
 
 def write_trajectory_piece(workspace: TaskWorkspace[Any], rate_hz: float, start: int) -> bytes:
     """CSV rows at `rate_hz` [Hz]; empty beyond the last. Raises NotFoundError, ExcitationError, LimitExceededError."""
-    try:
-        content, order = workspace.trajectory.read_bytes(), workspace.read_order()
-    except OSError:
-        order = None
-    if order is None:
+    content, order = read_bytes(workspace.trajectory), workspace.read_order()
+    if content is None or order is None:
         raise NotFoundError("files of the excitation are missing or damaged; hand it in again")
     trajectory = parse_trajectory_json(content, "trajectory.json", read_robot(workspace.robot / order.robot_file))
     rows = trajectory.duration_s * rate_hz

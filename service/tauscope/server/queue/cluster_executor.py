@@ -9,7 +9,7 @@ from concurrent.futures import BrokenExecutor, Executor, Future
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from tauscope.errors import StoreError
-from tauscope.server.queue.worker_pool import WorkerPool
+from tauscope.server.queue.worker_pool import WorkerPool, settle
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -75,7 +75,10 @@ class ClusterExecutor(Executor):
             self._look()
         except (ImportError, OSError, ValueError) as error:
             self._loop.stop(TIMEOUT_S)
-            raise _not_reached(address, error) from None
+            text = f"{SCHEDULER}={address}: does not answer ({type(error).__name__}); start the scheduler"
+            if isinstance(error, ImportError):
+                text = f"{SCHEDULER}: Dask is not installed; install tauscope[fleet]"
+            raise StoreError(f"{text}, or leave the variable out") from None
         self._watcher = threading.Thread(target=self._watch, name="cluster", daemon=True)
         self._watcher.start()
 
@@ -155,18 +158,8 @@ class ClusterExecutor(Executor):
             return
         error = inner.exception()
         if isinstance(error, KilledWorker):
-            outer.set_exception(BrokenExecutor(str(error)))
-        elif error is not None:
-            outer.set_exception(error)
-        else:
-            outer.set_result(inner.result())
-
-
-def _not_reached(address: str, error: Exception) -> StoreError:
-    if isinstance(error, ImportError):
-        return StoreError(f"{SCHEDULER}: Dask is not installed; install tauscope[fleet], or leave the variable out")
-    hint = "start the scheduler, or leave the variable out"
-    return StoreError(f"{SCHEDULER}={address}: does not answer ({type(error).__name__}); {hint}")
+            error = BrokenExecutor(str(error))
+        settle(outer, error, None if error else inner.result())
 
 
 def open_executor(workers: int, wait_s: float = 0.0, deadline_s: float | None = None) -> Executor:

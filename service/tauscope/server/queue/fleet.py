@@ -4,7 +4,7 @@ import csv
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -88,20 +88,16 @@ def analyse_fleet(
 
 
 def identify_robot(entry: FleetEntry, folder: Path) -> FleetResult:
-    return _time(identify, entry, folder)
+    return _perform(identify, entry, folder)
 
 
 def diagnose_robot(entry: FleetEntry, folder: Path) -> FleetResult:
-    return _time(diagnose, entry, folder)
-
-
-def _time(task: ModuleType, entry: FleetEntry, folder: Path) -> FleetResult:
-    begin = time.monotonic()
-    return replace(_perform(task, entry, folder), seconds=time.monotonic() - begin)
+    return _perform(diagnose, entry, folder)
 
 
 def _perform(task: ModuleType, entry: FleetEntry, folder: Path) -> FleetResult:
     """Perform a task and write its result; a failure that Tauscope foresees is a row of the table."""
+    begin, figures, error_text = time.monotonic(), dict[str, str](), None
     try:
         request = task.Request(
             robot=str(entry.robot),
@@ -110,11 +106,12 @@ def _perform(task: ModuleType, entry: FleetEntry, folder: Path) -> FleetResult:
         )
         result = task.perform(request, Files(), lambda *_: None)
         write_atomically(folder / f"{entry.name}.json", result.outputs["result.json"])
-        return FleetResult(entry, _figures(result.document), None)
+        figures = _figures(result.document)
     except TauscopeError as error:
-        return FleetResult(entry, {}, f"{error.code}: {error}")
+        error_text = f"{error.code}: {error}"
     except OSError as error:
-        return FleetResult(entry, {}, f"{error.filename or entry.name}: {error.strerror or error}")
+        error_text = f"{error.filename or entry.name}: {error.strerror or error}"
+    return FleetResult(entry, figures, error_text, time.monotonic() - begin)
 
 
 def _figures(found: Any) -> dict[str, str]:

@@ -36,12 +36,10 @@ class Housekeeping:
                 return
             try:
                 task()
-            except (TauscopeError, OSError) as error:
-                if task not in self._failing:
+            except Exception as error:
+                if task not in self._failing and isinstance(error, TauscopeError | OSError):
                     _log.warning("housekeeping: %s; it is tried again", error)
-                self._failing.add(task)
-            except Exception:
-                if task not in self._failing:
+                elif task not in self._failing:
                     _log.exception("housekeeping failed for an unforeseen reason; it is tried again")
                 self._failing.add(task)
             else:

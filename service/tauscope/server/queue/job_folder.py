@@ -1,6 +1,5 @@
 """The folder of a job: its record, its events, and documents that outlive the service."""
 
-import json
 import logging
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -15,7 +14,7 @@ from typing_extensions import override
 from tauscope.errors import TauscopeError
 from tauscope.files import is_disk_full
 from tauscope.server.store.event_log import EventLog
-from tauscope.server.store.files import read_stored, write_stored
+from tauscope.server.store.files import parse_object, read_bytes, read_stored, write_stored
 from tauscope.strict_model import StrictModel
 
 
@@ -137,20 +136,8 @@ JobEvent = Annotated[StateEvent | StepEvent | ProgressEvent | EndedEvent, Field(
 
 def read_document(path: Path, schema: str) -> bytes | None:
     """A JSON document as it was written, or None where the file is missing, damaged or of another schema."""
-    try:
-        content = path.read_bytes()
-        document = json.loads(content)
-    except (OSError, ValueError, RecursionError):
-        return None
-    return content if isinstance(document, dict) and document.get("schema") == schema else None
-
-
-def read_bytes(path: Path) -> bytes | None:
-    """A file as it was written, or None where it is missing."""
-    try:
-        return path.read_bytes()
-    except OSError:
-        return None
+    content = read_bytes(path)
+    return content if (parse_object(content or b"") or {}).get("schema") == schema else None
 
 
 _log = logging.getLogger("tauscope.jobs")

@@ -8,7 +8,7 @@ from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from dataclasses import dataclass
 from pathlib import Path
 
-from tauscope.errors import LimitExceededError, NotFoundError, TauscopeError
+from tauscope.errors import LimitExceededError, TauscopeError
 from tauscope.server.queue.cluster_executor import ClusterUnavailableError
 from tauscope.server.queue.job_folder import JobProblem, JobRecord, JobState, Workspace
 from tauscope.server.store.data_folder import ItemStore
@@ -39,23 +39,17 @@ class QueuedJob:
     identifier: str
 
     @property
-    def folder(self) -> Path:
-        """Of the job; raises NotFoundError where it is gone."""
-        return self.kind.items.folder(self.identifier)
+    def workspace(self) -> Workspace:
+        """Its folder, which may be gone: its record then cannot be read."""
+        return Workspace(self.kind.items.root / self.identifier)
 
     def attempts(self) -> int:
-        try:
-            record = Workspace(self.folder).read_record()
-        except NotFoundError:
-            return 0
+        record = self.workspace.read_record()
         return 0 if record is None else record.attempts
 
     def move(self, state: JobState, problem: JobProblem | None = None) -> bool:
         """Write a state; False where it may not follow, is damaged or gone. Raises OSError if the disk is full."""
-        try:
-            workspace = Workspace(self.folder)
-        except NotFoundError:
-            return False
+        workspace = self.workspace
         record = workspace.read_record()
         if record is not None and record.state is state:
             workspace.tell_lost_end()
@@ -67,7 +61,7 @@ class QueuedJob:
 
     def resume(self) -> JobRecord | None:
         """Have the job wait, if an earlier service left it unfinished; None where it has ended, or ends here."""
-        workspace = Workspace(self.folder)
+        workspace = self.workspace
         record = workspace.read_record()
         if record is None or record.state.is_end:
             workspace.tell_lost_end()
@@ -81,12 +75,11 @@ class QueuedJob:
 
     def requeue(self) -> None:
         """Have the job wait, because its work is ended with the service, or could not begin."""
+        record = self.workspace.read_record()
         try:
-            workspace = Workspace(self.folder)
-            record = workspace.read_record()
             if record is not None and record.may_become(JobState.QUEUED):
-                workspace.write_record(record.requeue(self.kind.items.clock()))
-        except (NotFoundError, OSError):
+                self.workspace.write_record(record.requeue(self.kind.items.clock()))
+        except OSError:
             _log.exception("the state of job %s could not be written", self.identifier)
 
 
@@ -230,9 +223,7 @@ class JobQueue:
 
     def _hand_over(self, job: QueuedJob) -> None:
         try:
-            future = self._executor.submit(job.kind.work, job.folder)
-        except NotFoundError:
-            return
+            future = self._executor.submit(job.kind.work, job.workspace.folder)
         except ClusterUnavailableError:  # it went a moment ago
             job.requeue()
             self._waiting.appendleft(job)
@@ -262,9 +253,18 @@ class JobQueue:
 
     def _end_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> _End:
         try:
-            problem = self._problem_of(job, future)
-        except (ClusterUnavailableError, BrokenExecutor) as error:
-            return self._end_lost(job, error)
+            problem = future.result()
+        except CancelledError:
+            problem = INTERRUPTED
+        except TauscopeError as error:  # a bound of the worker's
+            problem = JobProblem(code=error.code, detail=f"the job {error}")
+        except BrokenExecutor as error:
+            if not self._is_closed or isinstance(error, ClusterUnavailableError):
+                return self._end_lost(job, error)
+            problem = INTERRUPTED  # its process was ended with the service
+        except Exception:
+            _log.exception("job %s failed for an unforeseen reason", job.identifier)
+            problem = INTERNAL
         return (JobState.SUCCEEDED if problem is None else JobState.FAILED), problem
 
     def _end_lost(self, job: QueuedJob, error: Exception) -> _End:
@@ -274,21 +274,3 @@ class JobQueue:
             return JobState.FAILED, WORKER_LOST
         _log.warning("job %s waits again: %s", job.identifier, error)
         return JobState.QUEUED, None
-
-    def _problem_of(self, job: QueuedJob, future: "Future[JobProblem | None]") -> JobProblem | None:
-        """Why the work of a job has no result; None where it has one. Raises an error where its worker was lost."""
-        try:
-            return future.result()
-        except ClusterUnavailableError:
-            raise
-        except CancelledError:
-            return INTERRUPTED
-        except TauscopeError as error:  # a bound of the worker's
-            return JobProblem(code=error.code, detail=f"the job {error}")
-        except BrokenExecutor:
-            if self._is_closed:  # its process was ended with the service
-                return INTERRUPTED
-            raise
-        except Exception:
-            _log.exception("job %s failed for an unforeseen reason", job.identifier)
-            return INTERNAL

@@ -16,7 +16,7 @@ from tauscope.files import write_atomically
 from tauscope.server.queue import job_folder
 from tauscope.server.queue.queue import JobKind, JobQueue
 from tauscope.server.store.data_folder import ItemStore
-from tauscope.server.store.files import hash_file
+from tauscope.server.store.files import hash_file, parse_object, read_bytes
 from tauscope.server.store.recordings import RecordingStore
 from tauscope.strict_model import StrictModel
 from tauscope.tasks.task import ROLES, Files
@@ -76,29 +76,23 @@ class TaskWorkspace(job_folder.Workspace[Order]):
     def read_output(self, name: str) -> bytes | None:
         """An output, or None where the file is missing, damaged or of another schema."""
         schema = self.outputs[name]
-        return (
-            job_folder.read_bytes(self.folder / name)
-            if schema is None
-            else job_folder.read_document(self.folder / name, schema)
-        )
+        path = self.folder / name
+        return read_bytes(path) if schema is None else job_folder.read_document(path, schema)
 
     def read_result(self) -> bytes | None:
         return self.read_output("result.json")
 
     def refused_exports(self) -> dict[str, str]:
         """Formats that cannot hold the model, each with the reason; empty before the exports were written."""
-        try:
-            refused = json.loads((self.exports / "refused.json").read_bytes())
-        except (OSError, ValueError, RecursionError):
-            return {}
-        return {str(key): str(reason) for key, reason in refused.items()} if isinstance(refused, dict) else {}
+        refused = parse_object(read_bytes(self.exports / "refused.json") or b"") or {}
+        return {key: str(reason) for key, reason in refused.items()}
 
     def read_export(self, file_name: str) -> bytes:
         """An export. Raises NotFoundError if it was not written."""
-        try:
-            return (self.exports / file_name).read_bytes()
-        except OSError:
-            raise NotFoundError(f"no export {file_name} is kept here; hand the {self.noun} in again") from None
+        content = read_bytes(self.exports / file_name)
+        if content is None:
+            raise NotFoundError(f"no export {file_name} is kept here; hand the {self.noun} in again")
+        return content
 
     def write_outputs(self, outputs: Mapping[str, bytes], *folders: Path) -> None:
         """Keep the outputs, every export that can hold the model, and the reasons of those that cannot."""

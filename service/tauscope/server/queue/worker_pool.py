@@ -153,7 +153,7 @@ class WorkerPool(Executor):
             worker = self._take_worker()
         except OSError as error:
             self.obstacle = f"no worker process can be started ({error.strerror})"
-            return _settle(future, BrokenProcessPool(self.obstacle))
+            return settle(future, BrokenProcessPool(self.obstacle))
         # A cancelled future is done at once: whatever works on it is of no use any more.
         future.add_done_callback(lambda done: worker.kill() if done.cancelled() else None)
         outcome = self._call(worker, call)
@@ -164,7 +164,7 @@ class WorkerPool(Executor):
                 self._idle.append(worker)
         if not is_reusable:
             worker.close()
-        _settle(future, outcome.error, outcome.result)
+        settle(future, outcome.error, outcome.result)
 
     def _take_worker(self) -> "_Worker":
         """A process that is ready; raises OSError where none can be started."""
@@ -210,7 +210,7 @@ class _Outcome:
     is_clean: bool = True
 
 
-def _settle(future: "Future[Any]", error: BaseException | None, result: Any = None) -> None:
+def settle(future: "Future[Any]", error: BaseException | None, result: Any = None) -> None:
     """Tell a future how its work ended, unless it was cancelled."""
     if not future.set_running_or_notify_cancel():
         return

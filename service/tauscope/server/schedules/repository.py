@@ -9,8 +9,9 @@ from sqlalchemy.orm import Session
 
 from tauscope.errors import NotFoundError
 from tauscope.robot.messages import nearest, shown
-from tauscope.server.store.database.database import Database, read_row
+from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.tables import Firing, Item, Schedule
+from tauscope.strict_model import take_fields
 
 UNDECIDED = ("asked", "claimed")  # states of a firing that will become another one
 
@@ -33,9 +34,8 @@ class FiringEntry:
 
 def firing_entry(session: Session, row: Firing) -> FiringEntry:
     """What is given out of a firing, and where that stands which it started."""
-    item = None
-    if row.item_kind is not None and row.item_identifier is not None:
-        item = row.item_kind, row.item_identifier
+    kind, identifier = row.item_kind, row.item_identifier
+    item = None if kind is None or identifier is None else (kind, identifier)
     state, is_final = None, row.state not in UNDECIDED
     if item is not None:
         query = select(Item.state, Item.is_final).where(
@@ -45,7 +45,7 @@ def firing_entry(session: Session, row: Firing) -> FiringEntry:
         # What is not in the index yet goes on; what is not in it any more was removed, which is told by the folder.
         state, is_final = (None, False) if found is None else (found[0], found[1])
     told = {"item": item, "item_state": state, "is_final": is_final}
-    return read_row(FiringEntry, row, number=row.id, schedule=row.schedule.name, **told)
+    return take_fields(FiringEntry, row, number=row.id, schedule=row.schedule.name, **told)
 
 
 class ScheduleRepository:
@@ -73,14 +73,12 @@ class ScheduleRepository:
             return _schedule(session, name)
 
     def schedules(self) -> list[Schedule]:
-        with self._database.reading() as session:
-            return list(session.scalars(select(Schedule).order_by(Schedule.name)))
+        return self._database.fetch(select(Schedule).order_by(Schedule.name))
 
     def due(self, now: datetime) -> list[Schedule]:
         """Schedules that this site may do and that are due, the longest first."""
         query = select(Schedule).where(Schedule.next_due <= now, self._is_mine()).order_by(Schedule.next_due)
-        with self._database.reading() as session:
-            return list(session.scalars(query))
+        return self._database.fetch(query)
 
     def claim(self, schedule: Schedule, next_due: datetime | None, now: datetime) -> int | None:
         """Number of the firing of a due schedule; None where another service has it, or it was changed."""

@@ -9,6 +9,7 @@ import shutil
 import tarfile
 import tempfile
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any
@@ -19,6 +20,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from tauscope.errors import StoreError
 from tauscope.files import open_atomically, sync_folder
 from tauscope.server.store.database import database as store
+from tauscope.server.store.files import hash_file
 
 _FORM = "alembic_version"
 
@@ -112,7 +114,9 @@ def write_backup(data_folder: Path, database: store.Database, target: Path, vers
             lines.writelines(dump_lines(database.engine))
             _add(archive, _DATABASE, lines, hashes)
         for path in _files(data_folder):
-            _add_file(archive, path, data_folder, hashes)
+            with suppress(FileNotFoundError), path.open("rb") as content:  # else it was removed meanwhile
+                name = f"{_DATA}/{path.relative_to(data_folder).as_posix()}"
+                _add(archive, name, content, hashes, os.fstat(content.fileno()).st_mtime)
         manifest = {"form": FORM, "created": datetime.now(UTC).isoformat(), "version": version, "files": hashes}
         _add(archive, _MANIFEST, io.BytesIO(json.dumps(manifest, indent=1).encode()), {})
     sync_folder(target.parent)
@@ -150,18 +154,6 @@ def _files(data_folder: Path) -> Iterator[Path]:
                 yield path
 
 
-def _add_file(archive: tarfile.TarFile, path: Path, data_folder: Path, hashes: dict[str, dict[str, Any]]) -> None:
-    """Add a file as far as it goes now; one that was removed meanwhile is left out."""
-    try:
-        file = path.open("rb")
-    except FileNotFoundError:
-        return
-    with file:
-        status = os.fstat(file.fileno())
-        name = f"{_DATA}/{path.relative_to(data_folder).as_posix()}"
-        _add(archive, name, file, hashes, status.st_mtime)
-
-
 def _add(
     archive: tarfile.TarFile, name: str, file: IO[bytes], hashes: dict[str, dict[str, Any]], modified: float = 0.0
 ) -> None:
@@ -197,12 +189,14 @@ def _unpack(source: Path, staged: Path) -> dict[str, Any]:
         found, manifest = {}, None
         with tarfile.open(source, "r|gz") as archive:
             for entry in archive:
-                if not entry.isreg() or not _is_confined(entry.name) or entry.name in found:
+                is_foreign = not entry.isreg() or not _is_confined(entry.name) or entry.name in found
+                content = None if is_foreign else archive.extractfile(entry)
+                if content is None:
                     raise _refuse(source, f"{entry.name}: does not belong there")
                 if entry.name == _MANIFEST:
-                    manifest = json.loads(_content(archive, entry).read())
-                    continue
-                found[entry.name] = _write(_content(archive, entry), staged / entry.name)
+                    manifest = json.loads(content.read())
+                else:
+                    found[entry.name] = _write(content, staged / entry.name)
     except (tarfile.TarError, EOFError, OSError, ValueError) as error:
         if isinstance(error, OSError) and error.errno is not None and not isinstance(error, gzip.BadGzipFile):
             raise
@@ -218,25 +212,15 @@ def _unpack(source: Path, staged: Path) -> dict[str, Any]:
     return expected
 
 
-def _content(archive: tarfile.TarFile, entry: tarfile.TarInfo) -> IO[bytes]:
-    file = archive.extractfile(entry)
-    assert file is not None  # noqa: S101 - it is a regular file
-    return file
-
-
 def _write(file: IO[bytes], path: Path) -> tuple[int, str]:
     """Write a file; its size and its sha256."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    digest, size = hashlib.sha256(), 0
     with path.open("xb") as target:
-        while piece := file.read(_PIECE):
-            digest.update(piece)
-            size += len(piece)
-            target.write(piece)
+        shutil.copyfileobj(file, target, _PIECE)
         target.flush()
         os.fsync(target.fileno())
     path.chmod(0o640)
-    return size, digest.hexdigest()
+    return path.stat().st_size, hash_file(path)
 
 
 def _is_confined(name: str) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tauscope.server.store.files import lock_file
+from tauscope.server.store.files import lock_file, parse_object
 
 _TAIL = 2**16
 
@@ -46,7 +46,7 @@ class EventLog:
                 lines = file.read().split(b"\n")
         except OSError:
             return None
-        return _parse(lines[-2]) if len(lines) > 1 else None
+        return parse_object(lines[-2]) if len(lines) > 1 else None
 
     def follow(self, after: int = 0) -> "LogFollower":
         return LogFollower(self.path, after)
@@ -72,16 +72,7 @@ class LogFollower:
         events = []
         for line in whole.split(b"\n")[:-1]:
             self._number += 1
-            parsed = _parse(line) if self._number > self._after else None
+            parsed = parse_object(line) if self._number > self._after else None
             if parsed is not None:
                 events.append(LoggedEvent(self._number, parsed))
         return events
-
-
-def _parse(line: bytes) -> dict[str, Any] | None:
-    """The object of a line; None where the line is damaged."""
-    try:
-        content = json.loads(line)
-    except (ValueError, RecursionError):
-        return None
-    return content if isinstance(content, dict) else None

@@ -2,6 +2,7 @@
 
 import fcntl
 import hashlib
+import json
 import os
 import re
 import secrets
@@ -11,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
@@ -111,6 +112,23 @@ def read_stored(path: Path, kind: type[Stored]) -> Stored | None:
     try:
         return kind.model_validate_json(path.read_bytes())
     except (OSError, ValidationError):
+        return None
+
+
+def parse_object(text: bytes) -> dict[str, Any] | None:
+    """The object of a JSON text; None where it is damaged, or something else."""
+    try:
+        content = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    return content if isinstance(content, dict) else None
+
+
+def read_bytes(path: Path) -> bytes | None:
+    """A file as it was written, or None where it is missing."""
+    try:
+        return path.read_bytes()
+    except OSError:
         return None
 
 

@@ -142,11 +142,9 @@ class RecordingStore:
         return self.root / name
 
     def holds(self, name: str) -> bool:
-        try:
-            self._status(name)
-        except NotFoundError:
-            return False
-        return True
+        with suppress(NotFoundError):
+            return self._status(name) is not None
+        return False
 
     def find(self, name: str) -> StoredRecording:
         """A recording with its sha256, computed where it is not known. Raises NotFoundError if there is none."""
@@ -154,7 +152,7 @@ class RecordingStore:
         known = self._hashes.of(name, status)
         if known is None:
             known = self._hashes.remember(name, status, hash_file(self.root / name))
-        return StoredRecording(name, status.st_size, _read_modified(status), known.sha256, known.is_damaged)
+        return _describe(name, status, known)
 
     def digest(self, name: str) -> str:
         """The sha256 of a recording's bytes. Raises NotFoundError, or RecordingError if it is damaged."""
@@ -168,16 +166,13 @@ class RecordingStore:
         """All recordings, by name; of those that were sent or recorded, and changed since, the hash is looked at."""
         found = []
         for entry in sorted(self.root.iterdir()):
-            try:
+            with suppress(NotFoundError, FileNotFoundError):  # removed meanwhile, or no recording
                 status = self._status(entry.name)
                 known = self._hashes.of(entry.name, status)
                 if known is None and self._hashes.was_kept(entry.name):
                     found.append(self.find(entry.name))
-                    continue
-            except (NotFoundError, FileNotFoundError):
-                continue
-            sha256, is_damaged = (None, False) if known is None else (known.sha256, known.is_damaged)
-            found.append(StoredRecording(entry.name, status.st_size, _read_modified(status), sha256, is_damaged))
+                else:
+                    found.append(_describe(entry.name, status, known))
         return found
 
     def damaged(self, *, deep: bool) -> list[str]:
@@ -204,10 +199,8 @@ class RecordingStore:
         """Size and times of a recording, which has to be a regular file directly in the folder."""
         status = None
         if is_file_name(name):
-            try:
+            with suppress(OSError):
                 status = os.lstat(self.root / name)
-            except OSError:
-                status = None
         if status is None or not stat.S_ISREG(status.st_mode):
             hint = "check the name, or list the recordings"
             raise NotFoundError(f"no recording {shown(name)} lies on the server; {hint}")
@@ -229,5 +222,6 @@ class RecordingStore:
         return True
 
 
-def _read_modified(status: os.stat_result) -> datetime:
-    return datetime.fromtimestamp(status.st_mtime, UTC)
+def _describe(name: str, status: os.stat_result, known: KnownHash | None) -> StoredRecording:
+    sha256, is_damaged = (None, False) if known is None else (known.sha256, known.is_damaged)
+    return StoredRecording(name, status.st_size, datetime.fromtimestamp(status.st_mtime, UTC), sha256, is_damaged)

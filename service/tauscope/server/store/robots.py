@@ -5,7 +5,8 @@ import json
 import re
 import shutil
 import tempfile
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -36,12 +37,15 @@ class RobotStore:
         self._root = root
         root.mkdir(parents=True, exist_ok=True)
         for entry in root.glob(f"{_STAGED}*"):
-            self.discard(entry)
+            shutil.rmtree(entry, ignore_errors=True)
 
-    def stage(self) -> Path:
-        staged = Path(tempfile.mkdtemp(prefix=_STAGED, dir=self._root)) / _FILES
-        staged.mkdir()
-        return staged
+    @contextmanager
+    def stage(self) -> Iterator[Path]:
+        """A new folder for the files of a robot, which goes unless they are kept."""
+        with tempfile.TemporaryDirectory(prefix=_STAGED, dir=self._root, ignore_cleanup_errors=True) as folder:
+            staged = Path(folder) / _FILES
+            staged.mkdir()
+            yield staged
 
     def keep(self, staged: Path, robot_file: str, name: str) -> tuple[RobotVersion, bool]:
         """Keep staged files. Returns (RobotVersion,), whether it is new; else the same content was kept before."""
@@ -56,16 +60,11 @@ class RobotStore:
         sync_folder(self._root)
         return robot, True
 
-    def discard(self, staged: Path) -> None:
-        shutil.rmtree(staged.parent if staged.name == _FILES else staged, ignore_errors=True)
-
     def versions(self) -> list[RobotVersion]:
         found = []
         for entry in self._root.iterdir():
-            try:
+            with suppress(NotFoundError):
                 found.append(self.find(entry.name))
-            except NotFoundError:
-                continue
         return sorted(found, key=lambda each: (each.created, each.version), reverse=True)
 
     def find(self, version: str) -> RobotVersion:
@@ -86,10 +85,9 @@ class RobotStore:
 
     def remove(self, version: str) -> None:
         """Remove a version. Raises NotFoundError if it is not kept."""
-        going = Path(tempfile.mkdtemp(prefix=_STAGED, dir=self._root)) / version
-        self.files(version).parent.rename(going)
-        sync_folder(self._root)
-        shutil.rmtree(going.parent, ignore_errors=True)
+        with tempfile.TemporaryDirectory(prefix=_STAGED, dir=self._root, ignore_cleanup_errors=True) as going:
+            self.files(version).parent.rename(Path(going) / version)
+            sync_folder(self._root)
 
 
 def hash_robot(folder: Path, robot_file: str) -> str:

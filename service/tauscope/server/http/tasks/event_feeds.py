@@ -41,10 +41,12 @@ class Feed:
             return True
         return False
 
-    def read(self) -> tuple[bool, list[LoggedEvent]]:
-        """Whether the job has ended, and its events until now; none follows the end."""
-        has_ended = self._source.has_ended()
-        events = self._log.read()
+    def read(self) -> tuple[bool, list[LoggedEvent]] | None:
+        """Whether the job has ended, and its events until now, none behind the end; None where it cannot be read."""
+        try:
+            has_ended, events = self._source.has_ended(), self._log.read()
+        except OSError:
+            return None
         ends = (place for place, event in enumerate(events, start=1) if event.content.get("kind") == "ended")
         return has_ended, events[: next(ends, None)]
 
@@ -97,18 +99,8 @@ class EventFeeds:
                 for feed in feeds:
                     feed.end()
                 return
-            for feed, news in zip(feeds, await to_thread.run_sync(_read_each, feeds), strict=True):
+            found = await to_thread.run_sync(list, map(Feed.read, feeds))  # the thread draws from the map
+            for feed, news in zip(feeds, found, strict=True):
                 if news is not None:
                     feed.take(*news)
             await asyncio.sleep(POLL_S)
-
-
-def _read_each(feeds: list[Feed]) -> list[tuple[bool, list[LoggedEvent]] | None]:
-    """What is new in each feed; None where its log cannot be read now."""
-    found = []
-    for feed in feeds:
-        try:
-            found.append(feed.read())
-        except OSError:
-            found.append(None)
-    return found

@@ -18,8 +18,6 @@ from typing_extensions import override
 
 from tauscope.errors import NotFoundError
 from tauscope.robot import RobotReport
-from tauscope.robot.robot_file import LARGEST_ROBOT_FILE
-from tauscope.robot.xml_text import LARGEST_XML
 from tauscope.server.control.run_manager import Manager
 from tauscope.server.http.answers import MOTION, ROOT, SUBMISSION, After, AnswerModel, Identifier, Limit, PageAnswer
 from tauscope.server.http.bodies import PartRule
@@ -34,6 +32,7 @@ from tauscope.server.problems import ProblemError, problem_responses
 from tauscope.server.queue.job_folder import EndedEvent, JobFolder, ProgressEvent, StateEvent, StepEvent
 from tauscope.server.queue.received_files import check_received_robot, read_received_robot
 from tauscope.server.queue.task_job import stage_workspace
+from tauscope.server.store.data_folder import FOLDERS
 from tauscope.server.store.event_log import LoggedEvent
 
 EVENT_MODELS = (StateEvent, StepEvent, ProgressEvent, EndedEvent)
@@ -159,7 +158,6 @@ class Resource(ABC):
     """What is special about a resource; `words`: of handing in; `parts`: files of a form beside the robot's."""
 
     noun: str
-    plural: str
     models: tuple[type[submission.RobotRequest], type[BaseModel]]
     workspace: type[Any]
     examples: Examples
@@ -172,6 +170,10 @@ class Resource(ABC):
     @property
     def singular(self) -> str:
         return self.noun.rpartition(" ")[2]
+
+    @property
+    def plural(self) -> str:
+        return FOLDERS[self.singular]
 
     def path(self, identifier: str) -> str:
         return f"{ROOT}/{self.plural}/{identifier}"
@@ -350,10 +352,6 @@ def _lease_header(_lease: LeaseToken = None) -> None:
 
 
 def _read_files(folder: Path) -> list[RobotFileAnswer]:
-    answers = []
-    for path in sorted(folder.iterdir()):
-        if path.is_file() and not path.is_symlink():
-            with path.open("rb") as file:
-                content = file.read(max(LARGEST_ROBOT_FILE, LARGEST_XML))
-            answers.append(RobotFileAnswer(name=path.name, content=content.decode("utf-8", errors="replace")))
-    return answers
+    paths = [path for path in sorted(folder.iterdir()) if path.is_file() and not path.is_symlink()]
+    texts = [path.read_bytes().decode("utf-8", errors="replace") for path in paths]
+    return [RobotFileAnswer(name=path.name, content=text) for path, text in zip(paths, texts, strict=True)]

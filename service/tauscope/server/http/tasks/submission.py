@@ -144,7 +144,7 @@ async def receive_request(
     kind: type[Document],
     settings: Settings,
     robot_folder: Path,
-    further_parts: Mapping[str, bodies.PartRule] | None = None,
+    further_parts: Mapping[str, bodies.PartRule],
 ) -> Received[Document]:
     """Read JSON or a form. Raises ProblemError or LimitExceededError."""
     if bodies.media_type(request) == bodies.JSON:
@@ -154,7 +154,7 @@ async def receive_request(
     rules = {
         "request": bodies.PartRule(settings.max_document_bytes),
         **robot_part_rules(robot_folder),
-        **(further_parts or {}),
+        **further_parts,
     }
     form = await bodies.receive_form(request, rules)
     return Received(bodies.parse_document(form.texts.get("request", b"{}"), kind, within="part request"), form)
@@ -176,15 +176,8 @@ def keep_robot(received: Received[Any], folder: Path, robots: RobotStore) -> str
     return keep_inline_robot(folder, inline)
 
 
-def request_body(
-    kind: type[RobotRequest], examples: Examples, further_parts: Mapping[str, Any] | None = None
-) -> dict[str, Any]:
-    parts = {
-        "request": refer_to_model(kind),
-        **ROBOT_PARTS,
-        **(further_parts or {}),
-    }
-    form = form_body(parts, required=[])
+def request_body(kind: type[RobotRequest], examples: Examples, further_parts: Mapping[str, Any]) -> dict[str, Any]:
+    form = form_body({"request": refer_to_model(kind), **ROBOT_PARTS, **further_parts}, required=[])
     return {"requestBody": {"required": True, "content": {**json_body(kind, examples), **form}}}
 
 

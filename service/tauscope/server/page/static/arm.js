@@ -1,35 +1,24 @@
 // The kinematic chain in space, drawn by a projection of our own: nearest last, in any pose, from any side.
 
-import { h, named, s } from "./dom.js";
+import { h, named, s, unitsOf } from "./dom.js";
 
-const multiply = (a, b) => Array.from({ length: 16 }, (_, k) => {
-  const row = k >> 2;
-  const column = k & 3;
-  let sum = 0;
-  for (let i = 0; i < 4; i += 1) sum += a[4 * row + i] * b[4 * i + column];
-  return sum;
-});
+/** A transform from its rows, as the service tells it; the browser's own matrices are told by columns. */
+const matrixOf = (rows) => new DOMMatrix(rows.map((_, k) => rows[4 * (k % 4) + (k >> 2)]));
 
-function motion(type, q) {
-  if (type === "prismatic") return [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, q, 0, 0, 0, 1];
-  const c = Math.cos(q);
-  const n = Math.sin(q);
-  return [c, -n, 0, 0, n, c, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
-}
-
-const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
-const origin = (frame) => [frame[3], frame[7], frame[11]];
+const origin = (frame) => [frame.m41, frame.m42, frame.m43];
 
 /** Places of joints and link ends: T_j = T_{j-1} · before_j · motion_z(q_j) · after_j. */
 export function chain(joints, q) {
-  let frame = IDENTITY;
+  let frame = new DOMMatrix();
   const points = [[0, 0, 0]];
   const axes = [];
   joints.forEach((joint, place) => {
-    frame = multiply(frame, joint.before);
+    const value = q[place] ?? 0;
+    frame = frame.multiply(matrixOf(joint.before));
     points.push(origin(frame));
-    axes.push({ at: origin(frame), along: [frame[2], frame[6], frame[10]], type: joint.type });
-    frame = multiply(multiply(frame, motion(joint.type, q[place] ?? 0)), joint.after);
+    axes.push({ at: origin(frame), along: [frame.m31, frame.m32, frame.m33], type: joint.type });
+    frame = joint.type === "prismatic" ? frame.translate(0, 0, value) : frame.rotate(0, 0, (value * 180) / Math.PI);
+    frame = frame.multiply(matrixOf(joint.after));
     points.push(origin(frame));
   });
   return { points, axes };
@@ -158,11 +147,10 @@ export function armDrawing(report) {
 }
 
 export function jointRows(report, number) {
-  const unit = (joint) => (joint.type === "prismatic" ? "m" : "rad");
   return report.joints.map((joint) => [
     `${joint.number}`, joint.name, named(joint.type),
-    joint.limits.position ? `${joint.limits.position.map((v) => number(v, 3)).join(" … ")} ${unit(joint)}` : "–",
-    joint.limits.velocity ? `${number(joint.limits.velocity, 3)} ${unit(joint)}/s` : "–",
-    joint.limits.torque ? `${number(joint.limits.torque, 3)} ${joint.type === "prismatic" ? "N" : "Nm"}` : "–",
+    joint.limits.position ? `${joint.limits.position.map((v) => number(v, 3)).join(" … ")} ${unitsOf(joint.type).position}` : "–",
+    joint.limits.velocity ? `${number(joint.limits.velocity, 3)} ${unitsOf(joint.type).velocity}` : "–",
+    joint.limits.torque ? `${number(joint.limits.torque, 3)} ${unitsOf(joint.type).torque}` : "–",
   ]);
 }

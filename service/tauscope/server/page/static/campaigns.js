@@ -1,7 +1,7 @@
 // Campaigns: begun from a robot file, followed step by step, and read.
 
 import { ENDS, fetchRaw, follow, formOf, getJson, post, query, reportOf } from "./api.js";
-import { attempt, cautions, explained, h, moment, render, section, state, title, verdict } from "./dom.js";
+import { attempt, cautions, explained, h, moment, render, section, state, title, verdict, dropHandlers } from "./dom.js";
 import { HEADLINES, robotFiles } from "./diagnoses.js";
 import { DRIVERS } from "./drivers.js";
 import { move } from "./leases.js";
@@ -82,15 +82,12 @@ function outcomeOf(campaign, { diagnosis }) {
   ];
 }
 
+/** What the simulated arm may conceal at a joint: how the page calls it, and the effect. */
 const CONCEALED = {
-  nothing: () => null,
-  spring: (joint) => ({ effect: "joint_spring", joint, stiffness: 2.0 }),
-  load: (joint) => ({ effect: "load_dependent_friction", joint, mu: 0.1 }),
-  bristles: (joint) => ({ effect: "presliding_hysteresis", joint, distance: 0.02 }),
-};
-
-const CONCEALED_WORDS = {
-  nothing: "nothing", spring: "a spring", load: "friction that grows with the load", bristles: "bristles: friction that rises over a distance",
+  nothing: ["nothing", null],
+  spring: ["a spring", { effect: "joint_spring", stiffness: 2.0 }],
+  load: ["friction that grows with the load", { effect: "load_dependent_friction", mu: 0.1 }],
+  bristles: ["bristles: friction that rises over a distance", { effect: "presliding_hysteresis", distance: 0.02 }],
 };
 
 const LENGTHS = {
@@ -99,11 +96,9 @@ const LENGTHS = {
   thorough: { excitation: { periods: 10, slow_postures: 6 }, held_out: { periods: 4 } },
 };
 
-const LENGTH_WORDS = { usual: "usual", short: "short", thorough: "thorough" };
-const BACKENDS = Object.fromEntries(Object.entries(DRIVERS).map(([name, { title: words }]) => [name, words]));
 const TIMES = { virtual: "as fast as it computes", real: "by the clock" };
 
-const choice = (id, words) => h("select", { id }, Object.entries(words).map(([value, text]) => h("option", { value, text })));
+const choice = (id, table, wordsOf) => h("select", { id }, Object.entries(table).map(([value, each]) => h("option", { value, text: wordsOf(each, value) })));
 
 export async function showNewCampaign(root, { signal }) {
   const again = query("robot");
@@ -112,9 +107,8 @@ export async function showNewCampaign(root, { signal }) {
   const said = h("p", { role: "status", class: "note" });
   const begin = h("button", { type: "submit", class: "primary", disabled: true, text: "Begin" });
   const input = h("input", { type: "file", id: "robot", multiple: true, accept: ".yaml,.yml,.json,.urdf,.xml", onchange: () => take([...input.files]) });
-  const drop = h("div", { class: "drop", ondragover: (event) => { event.preventDefault(); drop.classList.add("over"); }, ondragleave: () => drop.classList.remove("over"),
-    ondrop: (event) => { event.preventDefault(); drop.classList.remove("over"); take([...event.dataTransfer.files]); } },
-  h("label", { for: "robot" }, "Robot file: URDF, MJCF or YAML, with the URDF that it names", input));
+  const drop = h("div", { class: "drop", ...dropHandlers(() => drop, (transfer) => take([...transfer.files])) },
+    h("label", { for: "robot" }, "Robot file: URDF, MJCF or YAML, with the URDF that it names", input));
 
   async function take(files) {
     const robot = files.find((file) => /\.(ya?ml|json)$/i.test(file.name)) ?? files[0];
@@ -152,11 +146,11 @@ export async function showNewCampaign(root, { signal }) {
   });
 
   const lacking = h("div", { class: "lacking", role: "status" });
-  const backend = choice("backend", BACKENDS);
-  const time = choice("time", TIMES);
-  const conceal = choice("conceal", CONCEALED_WORDS);
+  const backend = choice("backend", DRIVERS, (driver) => driver.title);
+  const time = choice("time", TIMES, (words) => words);
+  const conceal = choice("conceal", CONCEALED, ([words]) => words);
   const joints = h("select", { id: "conceal-joint" });
-  const length = choice("length", LENGTH_WORDS);
+  const length = choice("length", LENGTHS, (_, name) => name);
   const clear = h("input", { type: "checkbox", id: "clear" });
   const clearLabel = h("label", { class: "check", for: "clear", hidden: true }, clear, "The arm's whole reach is clear, and the emergency stop is at hand.");
   const plan = h("input", { type: "checkbox", id: "plan" });
@@ -173,8 +167,8 @@ export async function showNewCampaign(root, { signal }) {
     begin.disabled = true;
     said.textContent = "Handing in …";
     const isSim = DRIVERS[backend.value].is_simulated;
-    const concealed = isSim ? CONCEALED[conceal.value](Number(joints.value)) : null;
-    const request = { backend: { name: backend.value, ...(isSim ? { time: time.value } : {}), ...(concealed ? { scenario: { torque_noise_std: 0.1, seed: 1, effects: [concealed] } } : {}) }, diagnosis: { next_trajectory: plan.checked }, ...LENGTHS[length.value] };
+    const concealed = isSim ? CONCEALED[conceal.value][1] : null;
+    const request = { backend: { name: backend.value, ...(isSim ? { time: time.value } : {}), ...(concealed ? { scenario: { torque_noise_std: 0.1, seed: 1, effects: [{ ...concealed, joint: Number(joints.value) }] } } : {}) }, diagnosis: { next_trajectory: plan.checked }, ...LENGTHS[length.value] };
     if (isSim) request.run = { feed_forward: false, rate_hz: 200 };
     const body = formOf(request, [["robot", chosen.files[0]], ["urdf", chosen.files[1]]]);
     begin.disabled = await attempt(said, async () => {

@@ -1,9 +1,9 @@
 // A diagnosis as a story: where, what, how much, the proof, what next.
 
 import { download, formOf, getJson, post, query, reportOf } from "./api.js";
-import { attempt, chance, figures, h, moment, named, number, parameterName, percent, render, s, section, table, tabs, title, unit, unitsOf, verdict, withError } from "./dom.js";
+import { attempt, chance, figures, h, named, number, parameterName, percent, render, s, section, table, tabs, title, unit, unitsOf, verdict, withError } from "./dom.js";
 import { VARIABLES, heatMap } from "./heat.js";
-import { waiting } from "./identifications.js";
+import { linesOf, waiting } from "./identifications.js";
 import { move } from "./leases.js";
 import { jobList } from "./lists.js";
 import { motionSection } from "./motion.js";
@@ -27,12 +27,8 @@ const MOST_FINDINGS = 5;
 
 export async function showDiagnosis(root, { id, signal, show }) {
   const job = await getJson(`diagnoses/${id}`, signal);
-  const of = [...(job.recordings ?? []), ...(job.held_out ?? [])].map((each) => each.name).join(", ");
-  const robot = job.robot ? h("a", { href: `#/robots/${encodeURIComponent(job.robot)}`, text: job.robot }) : id;
-  const eyebrow = h("p", { class: "eyebrow" }, "Diagnosis · ", robot);
-  const meta = h("p", { class: "meta", text: `${moment(job.created)} · ${of}` });
-  const head = [eyebrow, h("h1", { text: job.robot ?? id }), meta];
-  if (job.state !== "succeeded") return waiting(root, head, job, signal, show);
+  const [eyebrow, meta] = linesOf("Diagnosis", job);
+  if (job.state !== "succeeded") return waiting(root, [eyebrow, meta], job, signal, show);
   const [result, plots, report] = await Promise.all([getJson(job.links.result, signal), getJson(job.links.plots, signal), reportOf(`diagnoses/${id}`, signal)]);
   const earlier = query("before");
   const previous = earlier && (await getJson(`diagnoses/${encodeURIComponent(earlier)}/result`, signal).catch(() => null));

@@ -143,6 +143,13 @@ export async function attempt(said, act) {
   }
 }
 
+/** Handlers of an element onto which files may be dropped; `target()` shows that they are over it. */
+export const dropHandlers = (target, take) => ({
+  ondragover: (event) => { event.preventDefault(); target().classList.add("over"); },
+  ondragleave: () => target().classList.remove("over"),
+  ondrop: (event) => { event.preventDefault(); target().classList.remove("over"); return take(event.dataTransfer); },
+});
+
 export function cautions(findings) {
   const doubts = findings.filter((each) => each.severity !== "info");
   return doubts.length ? h("ul", { class: "cautions" }, doubts.map((each) => h("li", { text: `${each.where}: ${each.text}` }))) : null;
@@ -159,7 +166,7 @@ export function section(id, heading, ...children) {
 
 export function tabs(label, names, chosen, choose) {
   const buttons = names.map((name, place) => h("button", {
-    type: "button", "aria-pressed": place === chosen ? "true" : "false",
+    type: "button", class: "quiet", "aria-pressed": place === chosen ? "true" : "false",
     onclick: () => {
       buttons.forEach((each, other) => each.setAttribute("aria-pressed", other === place ? "true" : "false"));
       choose(place);

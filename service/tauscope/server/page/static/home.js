@@ -1,7 +1,7 @@
 // Home: drop a robot file and recordings, see them as they are understood, mend them, and read the verdict.
 
 import { fetchRaw, formOf, getJson, post } from "./api.js";
-import { attempt, cautions, h, moment, named, number, percent, render, section, state, verdict } from "./dom.js";
+import { attempt, cautions, h, moment, named, number, percent, render, section, state, verdict, dropHandlers } from "./dom.js";
 
 const MOST_ROBOTS = 12;
 const OPTIONS = /; read it with --units.*|,? or go on with --trust-units.*/; // the page has buttons for these options
@@ -66,17 +66,8 @@ export async function showHome(root, { signal }) {
         clear();
         await take(await exampleFiles());
       } })));
-  const view = h("div", {
-    ondragover: (event) => { event.preventDefault(); drop.classList.add("over"); },
-    ondragleave: () => drop.classList.remove("over"),
-    ondrop: async (event) => {
-      event.preventDefault();
-      drop.classList.remove("over");
-      await take(await droppedFiles(event.dataTransfer));
-    } },
-  h("h1", { text: "Find the physics that your robot model lacks" }),
-  drop, said, sheet, section("recent", "Recent robots", recent(robots, items)));
-  render(root, view);
+  render(root, h("div", dropHandlers(() => drop, async (transfer) => take(await droppedFiles(transfer))),
+    h("h1", { text: "Find the physics that your robot model lacks" }), drop, said, sheet, section("recent", "Recent robots", recent(robots, items))));
   redraw();
 }
 

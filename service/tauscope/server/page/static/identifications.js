@@ -4,6 +4,7 @@ import { ENDS, download, follow, getJson, remove } from "./api.js";
 import { attempt, explained, figures, h, moment, number, parameterName, percent, render, s, section, state, table, tabs, unitsOf, withError } from "./dom.js";
 import { jobList } from "./lists.js";
 import { group, plot, zoomButtons } from "./plots.js";
+import { interpolate } from "./thinning.js";
 
 export const showIdentifications = jobList("identifications", "identification", "Identifications", "Parameters and friction from recordings.",
   (each) => (each.recordings ?? []).map((entry) => entry.name).join(", "));
@@ -14,11 +15,8 @@ const power = (fit) => percent(1 - fit.relative_error ** 2);
 
 export async function showIdentification(root, { id, signal, show }) {
   const job = await getJson(`identifications/${id}`, signal);
-  const of = [...(job.recordings ?? []), ...(job.held_out ?? [])].map((each) => each.name).join(", ");
-  const eyebrow = h("p", { class: "eyebrow" }, "Identification · ", job.robot ? h("a", { href: `#/robots/${encodeURIComponent(job.robot)}`, text: job.robot }) : id);
-  const meta = h("p", { class: "meta", text: `${moment(job.created)} · ${of}` });
-  const head = [eyebrow, h("h1", { text: job.robot ?? id }), meta];
-  if (job.state !== "succeeded") return waiting(root, head, job, signal, show);
+  const [eyebrow, meta] = linesOf("Identification", job);
+  if (job.state !== "succeeded") return waiting(root, [eyebrow, meta], job, signal, show);
   const [result, plots] = await Promise.all([getJson(job.links.result, signal), getJson(job.links.plots, signal)]);
   const { train, held_out: heldOut } = result.fit;
   const ratios = (heldOut ?? train).rms.map((rms, place) => rms / result.noise_std[place]);
@@ -39,8 +37,16 @@ export async function showIdentification(root, { id, signal, show }) {
   return null;
 }
 
+/** The lines above and below the heading of a job: what it is, of which robot; when it was handed in, with which recordings. */
+export function linesOf(noun, job) {
+  const of = [...(job.recordings ?? []), ...(job.held_out ?? [])].map((each) => each.name).join(", ");
+  return [h("p", { class: "eyebrow" }, `${noun} · `, job.robot ? h("a", { href: `#/robots/${encodeURIComponent(job.robot)}`, text: job.robot }) : job.id),
+    h("p", { class: "meta", text: `${moment(job.created)} · ${of}` })];
+}
+
 /** A job that has not succeeded: its steps and its time as it goes on, and the way to cancel it; or its problem. */
-export function waiting(root, head, job, signal, show) {
+export function waiting(root, [eyebrow, meta], job, signal, show) {
+  const head = [eyebrow, h("h1", { text: job.robot ?? job.id }), meta];
   const isOver = job.problem || ENDS.includes(job.state);
   const now = h("p", { role: "status" }, state(job.state));
   if (isOver) {
@@ -107,7 +113,7 @@ function frictionSection(plots) {
     const high = curve.friction.map((value, k) => value + 1.96 * curve.std[k]);
     const low = curve.friction.map((value, k) => value - 1.96 * curve.std[k]);
     // Every curve on one axis: where a curve has no point of its own, it is carried on between its neighbours.
-    const carried = (values) => order.map((k) => (k < curve.velocity.length ? values[k] : interpolated(curve.velocity, values, velocity[k])));
+    const carried = (values) => order.map((k) => (k < curve.velocity.length ? values[k] : interpolate(curve.velocity, values, velocity[k])));
     render(place, plot({ label: `Friction of ${curve.joint}`, raw: true, tall: true, x: order.map((k) => velocity[k]), xLabel: `velocity [${units.velocity}]`, yLabel: units.torque,
       bands: [{ series: [1, 2] }], series: [
         { label: "95 % high", values: carried(high), colour: "--band", hidden: true }, { label: "95 % low", values: carried(low), colour: "--band", hidden: true },
@@ -117,13 +123,6 @@ function frictionSection(plots) {
   }
   choose(0);
   return section("friction", "Friction", tabs("Joint", plots.friction.map((each) => each.joint), 0, choose), place);
-}
-
-function interpolated(x, y, at) {
-  let right = x.findIndex((value) => value >= at);
-  if (right <= 0) right = right < 0 ? x.length - 1 : 1;
-  const share = (at - x[right - 1]) / (x[right] - x[right - 1] || 1);
-  return y[right - 1] + share * (y[right] - y[right - 1]);
 }
 
 function interval(value, std, low, high) {

@@ -35,9 +35,12 @@ function row(each) {
 
 /** Remove an entry, but not before there was time to think again; leaving the page counts as thought. */
 function takeAway(line, each, restore) {
-  const act = async () => {
+  const decide = () => {
     clearTimeout(timer);
     window.removeEventListener("hashchange", act);
+  };
+  const act = async () => {
+    decide();
     try {
       await remove(each.path);
       line.remove();
@@ -48,11 +51,7 @@ function takeAway(line, each, restore) {
   };
   const timer = setTimeout(act, UNDO_MS);
   window.addEventListener("hashchange", act);
-  const undo = h("button", { type: "button", class: "link", text: "Undo", onclick: () => {
-    clearTimeout(timer);
-    window.removeEventListener("hashchange", act);
-    restore();
-  } });
+  const undo = h("button", { type: "button", class: "link", text: "Undo", onclick: () => { decide(); restore(); } });
   render(line, h("p", { role: "status" }, `${each.name} is removed. `, undo));
   undo.focus();
 }

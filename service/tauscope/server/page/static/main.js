@@ -32,30 +32,26 @@ let leaving = new AbortController();
 let live = { runs: [], campaigns: [] };
 let reached = true;
 
-let panel = null;
+let panel = null; // asks for a key
 
-/** Whether a key is being asked for: until then, every request would only be refused. */
-const isAsked = () => panel !== null;
-
-function askForKey(problem, go) {
+function needKey(problem) {
   if (panel) return;
   const input = h("input", { type: "password", autocomplete: "off", required: true, autofocus: true, id: "key" });
   const close = () => { panel.remove(); panel = null; };
   panel = h("dialog", { "aria-labelledby": "key-title" },
     h("h2", { id: "key-title", text: "An API key is needed" }), h("p", { class: "note" }, explained(problem)),
-    h("form", { onsubmit: (event) => { event.preventDefault(); useKey(input.value.trim()); close(); go(); } },
+    h("form", { onsubmit: (event) => { event.preventDefault(); useKey(input.value.trim()); close(); show(); } },
       h("label", { for: "key" }, "Key", input), h("p", { class: "note", text: "It is kept until this tab is closed, and nowhere else." }),
       h("div", { class: "row" }, h("button", { type: "submit", class: "primary", text: "Go on" }),
         hasKey() ? h("button", { type: "button", text: "Keep the one I have", onclick: close }) : null)));
-  document.getElementById("content").before(panel); // below what is said of a stop, and never over it
+  content.before(panel); // below what is said of a stop, and never over it
   panel.show(); // not as a modal: nothing may shut Stop away
   panel.scrollIntoView({ block: "nearest" });
 }
 
-function keyButton(place, change) {
-  const draw = () => render(place, hasKey() ? h("button", { type: "button", class: "link", text: "Use another key", onclick: change }) : null);
-  window.addEventListener("tauscope:key", draw);
-  draw();
+function offerKeyChange() {
+  const change = () => needKey({ message: "The key of this tab is replaced." });
+  render(document.getElementById("key-change"), hasKey() ? h("button", { type: "button", class: "link", text: "Use another key", onclick: change }) : null);
 }
 
 async function show() {
@@ -87,11 +83,9 @@ async function show() {
   }
 }
 
-const needKey = (problem) => askForKey(problem, show);
-
 async function pulse() {
   const quick = AbortSignal.timeout(PULSE_MS * 1.5);
-  if (isAsked()) { setTimeout(pulse, PULSE_MS); return; }
+  if (panel) { setTimeout(pulse, PULSE_MS); return; } // until there is a key, every request would only be refused
   try {
     const [runs, campaigns] = await Promise.all([getJson("runs?limit=8", quick), getJson("campaigns?limit=8", quick)]);
     const goesOn = (each) => !ENDS.includes(each.state);
@@ -159,7 +153,8 @@ stopButton.addEventListener("click", stopAll);
 window.addEventListener("hashchange", async () => { await show(); content.focus({ preventScroll: true }); window.scrollTo(0, 0); });
 window.addEventListener("tauscope:back", show);
 window.addEventListener("tauscope:ask-key", (event) => needKey(event.detail));
-keyButton(document.getElementById("key-change"), () => needKey({ message: "The key of this tab is replaced." }));
+window.addEventListener("tauscope:key", offerKeyChange);
+offerKeyChange();
 keepLeases(tellLeases);
 theme(localStorage.getItem("tauscope-theme") ?? "auto");
 getJson("/healthz").then(({ version }) => { document.getElementById("version").textContent = `Tauscope ${version}`; }).catch(() => {});

@@ -5,7 +5,7 @@ import { attempt, bytes, cautions, figures, h, number, render, section, table } 
 import { searchable } from "./lists.js";
 import { replay } from "./motion.js";
 import { group, jointStyle, plot, zoomButtons } from "./plots.js";
-import { lowerBound } from "./thinning.js";
+import { interpolate } from "./thinning.js";
 
 const EFFORTS = { tau: ["Torque", "tau", "Nm or N"], i: ["Current or drive units", "i", "drive units"], qref: ["Commanded position", "qref", "rad or m"] };
 
@@ -84,13 +84,7 @@ function overlayForm(samples, names, draw, signal) {
   return h("div", { class: "row" }, h("label", { for: "overlay", class: "inline" }, "Overlay", other), h("label", { for: "difference", class: "inline" }, difference, "Difference"), said);
 }
 
-/** A column at other instants, on straight lines between its samples; none beyond its ends. */
+/** A column at other instants; none beyond its ends. */
 function resampled(time, column, instants) {
-  return instants.map((instant) => {
-    const right = lowerBound(time, instant);
-    if (right === 0) return time[0] === instant ? column[0] : NaN;
-    if (right === time.length) return NaN;
-    const share = (instant - time[right - 1]) / (time[right] - time[right - 1]);
-    return column[right - 1] + share * (column[right] - column[right - 1]);
-  });
+  return instants.map((at) => (at < time[0] || at > time[time.length - 1] ? NaN : interpolate(time, column, at)));
 }

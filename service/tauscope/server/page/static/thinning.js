@@ -12,6 +12,13 @@ export function lowerBound(column, value) {
   return low;
 }
 
+/** A column at another instant, on the straight line between its neighbours, or that of its first or last two. */
+export function interpolate(x, column, at) {
+  const right = Math.min(Math.max(lowerBound(x, at), 1), x.length - 1);
+  const share = (at - x[right - 1]) / (x[right] - x[right - 1] || 1);
+  return column[right - 1] + share * (column[right] - column[right - 1]);
+}
+
 export function nearest(time, value) {
   const right = Math.min(lowerBound(time, value), time.length - 1);
   return right > 0 && value - time[right - 1] < time[right] - value ? right - 1 : right;

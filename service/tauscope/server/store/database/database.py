@@ -3,7 +3,6 @@
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,7 +11,7 @@ from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url, text
+from sqlalchemy import URL, Connection, Engine, Select, create_engine, event, make_url, text
 from sqlalchemy.exc import ArgumentError, DBAPIError, IntegrityError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from sqlalchemy.orm import Session
@@ -111,17 +110,10 @@ def _configuration(connection: Connection | None) -> Config:
     return configuration
 
 
+Row = TypeVar("Row")
 FILE_NAME = "tauscope.db"  # of the SQLite database in a data folder
-Entry = TypeVar("Entry")
 _SQLITE_MAGIC = b"SQLite format 3\0"
 _DAMAGE_HINT = "restore a backup, or move it away: the index is made anew, schedules and the choice of models are not"
-
-
-def read_row(kind: type[Entry], row: object, **more: Any) -> Entry:
-    """What is given out of a row: a dataclass of the same attributes. `more`: those that the row has not so."""
-    known: Any = kind
-    names = (field.name for field in fields(known) if field.name not in more)
-    return kind(**{name: getattr(row, name) for name in names}, **more)
 
 
 class Database:
@@ -146,6 +138,11 @@ class Database:
         """A transaction that reads. Raises StoreError if the database does not answer."""
         with self._own_words(), Session(self.engine, expire_on_commit=False) as session, session.begin():
             yield session
+
+    def fetch(self, query: Select[Row]) -> list[Row]:
+        """What a query of one column, or of one table, finds. Raises StoreError if the database does not answer."""
+        with self.reading() as session:
+            return list(session.scalars(query))
 
     @contextmanager
     def writing(self) -> Iterator[Session]:

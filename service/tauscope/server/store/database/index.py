@@ -8,10 +8,10 @@ from pydantic import Field
 from sqlalchemy import ColumnElement, delete, insert, select, update
 from sqlalchemy.orm import Session
 
-from tauscope.server.store.database.database import Database, read_row
+from tauscope.server.store.database.database import Database
 from tauscope.server.store.database.tables import Artefact, Item, Recording, RecordingUse, Robot, Site
 from tauscope.server.store.recordings import StoredRecording
-from tauscope.strict_model import entry
+from tauscope.strict_model import entry, take_fields
 
 
 @dataclass(frozen=True)
@@ -124,10 +124,13 @@ class Index:
             for each in facts:
                 row = rows.get(each.identifier)
                 if row is None:
-                    row = Item.__mapper__.polymorphic_map[kind].class_(site=site, kind=kind, identifier=each.identifier)
-                    rows[each.identifier] = row
+                    row = rows[each.identifier] = Item(site=site, kind=kind, identifier=each.identifier)
                     session.add(row)
-                _fill(row, each)
+                row.state, row.is_final, row.stamp = each.state, each.is_final, each.stamp
+                row.created, row.ended = each.created, each.ended
+                row.problem_code, row.problem_detail = each.problem or (None, None)
+                for column in FIGURES.get(kind, ()):
+                    setattr(row, column, each.figures.get(column))
                 row.robot_id = None if each.robot is None else robots[each.robot]
             session.flush()
             owned = [(rows[each.identifier].id, each) for each in facts]
@@ -144,8 +147,7 @@ class Index:
 
     def damaged(self, kind: str) -> frozenset[str]:
         query = select(Item.identifier).where(Item.site == self.site, Item.kind == kind, Item.state == "damaged")
-        with self._database.reading() as session:
-            return frozenset(session.scalars(query))
+        return frozenset(self._database.fetch(query))
 
     def mark_damaged(self, kind: str, identifier: str, detail: str) -> None:
         values = {"state": "damaged", "problem_code": "damaged", "problem_detail": detail}
@@ -154,9 +156,7 @@ class Index:
 
     def artefacts(self, kind: str, identifier: str) -> tuple[FileMetadata, ...]:
         query = select(Artefact).join(Item).where(*self._match(kind, identifier))
-        with self._database.reading() as session:
-            rows = session.scalars(query.order_by(Artefact.path))
-            return tuple(read_row(FileMetadata, row) for row in rows)
+        return tuple(take_fields(FileMetadata, row) for row in self._database.fetch(query.order_by(Artefact.path)))
 
     def _match(self, kind: str, identifier: str) -> tuple[ColumnElement[bool], ...]:
         return Item.site == self.site, Item.kind == kind, Item.identifier == identifier
@@ -186,8 +186,7 @@ class Index:
     def list_users(self, recording: str) -> frozenset[str]:
         query = select(Item.identifier).join(RecordingUse).where(Item.site == self.site)
         query = query.where(RecordingUse.origin == "server", RecordingUse.name == recording)
-        with self._database.reading() as session:
-            return frozenset(session.scalars(query))
+        return frozenset(self._database.fetch(query))
 
     def search(self, query: ItemQuery) -> list[ItemEntry]:
         columns = (Item.kind, Item.state, Item.site, Robot.name)
@@ -199,21 +198,10 @@ class Index:
         if query.recording_sha256 is not None:
             statement = statement.where(Item.recordings.any(RecordingUse.sha256 == query.recording_sha256))
         statement = statement.order_by(Item.created.desc(), Item.identifier.desc()).limit(query.limit)
-        with self._database.reading() as session:
-            return [_entry(row) for row in session.scalars(statement)]
+        return [_entry(row) for row in self._database.fetch(statement)]
 
     def robots(self) -> list[RobotEntry]:
-        with self._database.reading() as session:
-            rows = session.scalars(select(Robot).order_by(Robot.name))
-            return [read_row(RobotEntry, row) for row in rows]
-
-
-def _fill(row: Item, facts: ItemMetadata) -> None:
-    row.state, row.is_final, row.stamp = facts.state, facts.is_final, facts.stamp
-    row.created, row.ended = facts.created, facts.ended
-    row.problem_code, row.problem_detail = facts.problem or (None, None)
-    for column in FIGURES.get(facts.kind, ()):
-        setattr(row, column, facts.figures.get(column))
+        return [take_fields(RobotEntry, row) for row in self._database.fetch(select(Robot).order_by(Robot.name))]
 
 
 def _find_robots(session: Session, facts: Sequence[ItemMetadata]) -> dict[str, int]:
@@ -235,4 +223,4 @@ def _find_robots(session: Session, facts: Sequence[ItemMetadata]) -> dict[str, i
 
 def _entry(row: Item) -> ItemEntry:
     figures = {column: getattr(row, column) for column in FIGURES.get(row.kind, ())}
-    return read_row(ItemEntry, row, robot=row.robot and row.robot.name, figures=figures)
+    return take_fields(ItemEntry, row, robot=row.robot and row.robot.name, figures=figures)

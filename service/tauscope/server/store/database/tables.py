@@ -68,7 +68,10 @@ class Robot(Base):
 
 
 class Item(Base):
-    """`is_final`: whether its state stays; `stamp` changes with its folder; `artefacts` are its files."""
+    """`is_final`: whether its state stays; `stamp` changes with its folder.
+
+    Columns that only some kinds have, such as `verdict`, are null elsewhere.
+    """
 
     __tablename__ = "items"
     __table_args__ = (
@@ -76,7 +79,6 @@ class Item(Base):
         Index(None, "kind", "created"),
         Index(None, "robot_id", "created"),
     )
-    __mapper_args__ = {"polymorphic_on": "kind"}  # noqa: RUF012 - read by SQLAlchemy when the class is made
 
     id: Mapped[int] = mapped_column(primary_key=True)
     site: Mapped[str] = mapped_column(ForeignKey("sites.identifier"))
@@ -90,38 +92,13 @@ class Item(Base):
     ended: Mapped[datetime | None]
     problem_code: Mapped[str | None]
     problem_detail: Mapped[str | None]
+    backend: Mapped[str | None]
+    relative_error: Mapped[float | None]
+    held_out_error: Mapped[float | None]
+    verdict: Mapped[str | None]
+    headline: Mapped[str | None]
     robot: Mapped[Robot | None] = relationship(lazy="joined")
-    artefacts: Mapped[list["Artefact"]] = relationship(cascade="all, delete-orphan", passive_deletes=True)
     recordings: Mapped[list["RecordingUse"]] = relationship(cascade="all, delete-orphan", passive_deletes=True)
-
-
-class Excitation(Item):
-    __mapper_args__ = {"polymorphic_identity": "excitation"}  # noqa: RUF012
-
-
-class Run(Item):
-    __mapper_args__ = {"polymorphic_identity": "run"}  # noqa: RUF012
-    backend: Mapped[str | None] = mapped_column(nullable=True)
-
-
-class Identification(Item):
-    __mapper_args__ = {"polymorphic_identity": "identification"}  # noqa: RUF012
-    relative_error: Mapped[float | None] = mapped_column(nullable=True)
-    held_out_error: Mapped[float | None] = mapped_column(nullable=True)
-
-
-class Diagnosis(Item):
-    __mapper_args__ = {"polymorphic_identity": "diagnosis"}  # noqa: RUF012
-    verdict: Mapped[str | None] = mapped_column(nullable=True)
-    headline: Mapped[str | None] = mapped_column(nullable=True)
-
-
-class Rollout(Item):
-    __mapper_args__ = {"polymorphic_identity": "rollout"}  # noqa: RUF012
-
-
-class Campaign(Item):
-    __mapper_args__ = {"polymorphic_identity": "campaign"}  # noqa: RUF012
 
 
 class Artefact(Base):
