@@ -73,22 +73,11 @@ class InstructionParser:
             elif _library.updateCRC(0, self._buffer, end - 2) != int.from_bytes(self._buffer[end - 2 : end], "little"):
                 del self._buffer[0]
             else:
-                frame = list(self._buffer[:end])
+                frame = bytes(self._buffer[:end])
                 del self._buffer[:end]
                 if frame[7] != _STATUS:
-                    body = _remove_stuffing(frame[7:-2])
-                    found.append(Instruction(frame[4], body[0], bytes(body[1:]), len(frame)))
-
-
-def _remove_stuffing(stuffed: list[int]) -> list[int]:
-    """Byte by byte: FD after FF FF FD is left out."""
-    plain: list[int] = []
-    skipped = False
-    for byte in stuffed:
-        skipped = byte == 0xFD and not skipped and plain[-3:] == [0xFF, 0xFF, 0xFD]
-        if not skipped:
-            plain.append(byte)
-    return plain
+                    body = frame[7:-2].replace(b"\xff\xff\xfd\xfd", b"\xff\xff\xfd")
+                    found.append(Instruction(frame[4], body[0], body[1:], len(frame)))
 
 
 Delivery = tuple[float, bytes]  # when bytes arrive at the master [s], and which
