@@ -32,15 +32,6 @@ class AxisDemand:
 
 
 @dataclass(frozen=True)
-class AxisMeasurement:
-    """What a drive's sensors tell of its joint."""
-
-    position: float  # [rad or m]
-    velocity: float  # [rad/s or m/s]
-    torque: float  # [Nm or N]
-
-
-@dataclass(frozen=True)
 class AxisScale:
     """Counts and per mille of an emulated drive."""
 
@@ -151,13 +142,13 @@ class EmulatedDrive:
             return AxisDemand(AxisMode.TORQUE, torque=min(max(torque, -cap), cap), torque_cap=cap)
         return AxisDemand(AxisMode.HOLDING, torque_cap=cap)
 
-    def measure(self, measurement: AxisMeasurement) -> None:
-        """Let the sensors see the joint."""
+    def measure(self, position: float, velocity: float, torque: float) -> None:
+        """Let the sensors see the joint. [rad or m], [rad/s or m/s], [Nm or N]."""
         put, scale = self.dictionary.put, self.scale
-        put(0x6064, round(measurement.position * scale.counts_per_radian))
-        put(0x606C, round(measurement.velocity * scale.counts_per_radian))
-        put(0x6077, round(measurement.torque / scale.torque_per_permille))
-        if abs(measurement.velocity) < _STANDING:
+        put(0x6064, round(position * scale.counts_per_radian))
+        put(0x606C, round(velocity * scale.counts_per_radian))
+        put(0x6077, round(torque / scale.torque_per_permille))
+        if abs(velocity) < _STANDING:
             self.power.end_quick_stop()
         self._show_status()
 
@@ -259,7 +250,7 @@ class EmulatedDrive:
         """Entries at power-up; the target position is stale on purpose, as it is on a real drive after a run."""
         dictionary = object_dictionary.ObjectDictionary()
         for index, subindex, size, value, signed, writable in _ENTRIES:
-            dictionary.add(index, subindex, size, value, signed=signed, writable=writable)
+            dictionary.entries[index, subindex] = object_dictionary.Entry(size, value, signed, writable)
         for (index, subindex), hook in self._hooks().items():
             dictionary.entries[index, subindex].hook = hook
         dictionary.put(0x6076, self.scale.rated_torque_mnm)

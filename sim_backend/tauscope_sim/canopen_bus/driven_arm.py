@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from tauscope.robot import Robot
 from tauscope.robot.robot import Array
-from tauscope_sim.canopen_bus.drive import AxisDemand, AxisMeasurement, AxisMode, EmulatedDrive
+from tauscope_sim.canopen_bus.drive import AxisDemand, AxisMode, EmulatedDrive
 from tauscope_sim.device.servo import InertiaSchedule, Servo
 from tauscope_sim.device.target import Target, catching_up_acceleration
 from tauscope_sim.scenario import Scenario
@@ -96,8 +96,8 @@ class DrivenArm:
         torque = np.clip(torque, np.minimum(at_tick, self.torque), np.maximum(at_tick, self.torque))
         torque = torque + self._torque_noise * self._rng.standard_normal(len(self._drives))
         seen = zip(position + self.encoder_offset, velocity, torque, strict=True)
-        for drive, (q, v, tau) in zip(self._drives, seen, strict=True):
-            drive.measure(AxisMeasurement(float(q), float(v), float(tau)))
+        for drive, values in zip(self._drives, seen, strict=True):
+            drive.measure(*map(float, values))
 
     def _demands(self) -> list[AxisDemand]:
         """What the drives demand now; targets begin anew where a drive does something else than before."""
