@@ -43,6 +43,12 @@ class Scenario:
         return Sensors(self, robot.joint_count, np.random.default_rng(self.seed) if rng is None else rng)
 
 
+def quantise(position: Array, step: Array) -> Array:
+    """The nearest multiples of a resolution. `step`: (n,), zero for none [rad or m]."""
+    coarse = np.where(step > 0.0, step, 1.0)
+    return np.where(step > 0.0, np.rint(position / coarse) * coarse, position)
+
+
 class Sensors:
     """What a recording shows of the arm, sample by sample; causal, so that a control loop can use it."""
 
@@ -51,9 +57,7 @@ class Sensors:
         shape = (joint_count,)
         self._torque_std = np.broadcast_to(scenario.torque_noise_std, shape)
         self._position_std = np.broadcast_to(scenario.position_noise_std, shape)
-        step = np.broadcast_to(scenario.encoder_step, shape)
-        self._coarse = step > 0.0
-        self._step = np.where(self._coarse, step, 1.0)
+        self._step = np.broadcast_to(scenario.encoder_step, shape)
         self._rng = rng
 
     def measure(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
@@ -61,6 +65,5 @@ class Sensors:
         for channel in self._channels:
             position, torque = channel.pass_on(time, position, torque)
         noise = self._rng.standard_normal((2, len(position)))
-        noisy = position + self._position_std * noise[0]
-        recorded = np.where(self._coarse, np.rint(noisy / self._step) * self._step, noisy)
+        recorded = quantise(position + self._position_std * noise[0], self._step)
         return recorded, torque + self._torque_std * noise[1]

@@ -13,7 +13,6 @@ import threading
 import time
 from importlib import import_module
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from tauscope_sim.emulation.emulator import MOST_STEPS, EmulatorOrder, Port
@@ -40,9 +39,7 @@ class Arrivals:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         os.eventfd_write(self._end, 1)
         self._thread.join()
         os.close(self._wake)
