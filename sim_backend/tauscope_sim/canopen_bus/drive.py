@@ -1,6 +1,6 @@
 """One emulated CiA 402 drive: objects, power state, modes, heartbeats. Time and frames go in, frames come out."""
 
-from collections.abc import Callable
+from collections.abc import Container
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
@@ -62,7 +62,7 @@ _NMT_RESETS = (0x81, 0x82)
 _QUICK_STOP_STAYS = range(5, 9)
 _STANDING = 1e-3
 _INTERPOLATE = 0x10
-_EXPONENTS = range(-6, 1)
+_PERIODS, _EXPONENTS = range(1, 256), range(-6, 1)  # values of 0x60C2 that are taken
 
 
 class EmulatedDrive:
@@ -269,13 +269,13 @@ class EmulatedDrive:
             (0x6040, 0): self._take_controlword,
             (0x605A, 0): take_option,
             (0x6060, 0): self._take_mode,
-            (0x60C2, 1): partial(_require, lambda value: value != 0),
-            (0x60C2, 2): partial(_require, lambda exponent: exponent in _EXPONENTS),
+            (0x60C2, 1): partial(_require, _PERIODS),
+            (0x60C2, 2): partial(_require, _EXPONENTS),
         }
 
 
-def _require(is_taken: Callable[[int], bool], value: int) -> None:
-    if not is_taken(value):
+def _require(taken: Container[int], value: int) -> None:
+    if value not in taken:
         raise object_dictionary.AbortError(object_dictionary.Abort.VALUE_RANGE)
 
 

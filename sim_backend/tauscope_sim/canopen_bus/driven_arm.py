@@ -120,15 +120,11 @@ class DrivenArm:
         for kind in dict.fromkeys(kinds):
             if kind[0] in TRACKING:
                 joints = [joint for joint, other in enumerate(kinds) if other == kind]
-                self._targets[kind] = joints, self._target(joints, kind)
-
-    def _target(self, joints: list[int], kind: Kind) -> Target:
-        period = kind[1] / self._period_s or None
-        goal, rate, acceleration = self._goal[joints], self._goal_rate[joints], self._acceleration[joints]
-        target = Target(goal, rate, acceleration, self._period_s, period)
-        unlimited = np.full(len(joints), np.inf)
-        target.limit(-unlimited, unlimited, self._fastest[joints])
-        return target
+                goal, rate, acceleration = self._goal[joints], self._goal_rate[joints], self._acceleration[joints]
+                target = Target(goal, rate, acceleration, self._period_s, kind[1] / self._period_s or None)
+                unlimited = np.full(len(joints), np.inf)
+                target.limit(-unlimited, unlimited, self._fastest[joints])
+                self._targets[kind] = joints, target
 
     def _torque_of(self, demands: Sequence[AxisDemand]) -> Array:
         """Torque of the position loops where a target is tracked, else what is demanded."""

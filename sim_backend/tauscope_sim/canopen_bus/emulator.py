@@ -124,28 +124,24 @@ class CanEmulator(Emulator):
 
     def _carry_out(self, fault: InjectedFault) -> None:
         until_s = self.now_s + fault.seconds
-        concerned = [self._drive(fault.device)] if fault.device else list(self.drives)
-        match fault.kind:
-            case FaultKind.SILENT:
-                for drive in concerned:
+        is_everywhere = fault.kind is FaultKind.POWER_DIP or not fault.device
+        for drive in self.drives if is_everywhere else [self._drive(fault.device)]:
+            match fault.kind:
+                case FaultKind.SILENT:
                     self._away_until_s[drive.node_id] = until_s
-            case FaultKind.BUS_OFF:
-                for drive in concerned:
+                case FaultKind.BUS_OFF:
                     drive.leave_bus()
                     self._away_until_s[drive.node_id] = until_s
-            case FaultKind.RESET | FaultKind.POWER_DIP:
-                for drive in self.drives if fault.kind is FaultKind.POWER_DIP else concerned:
+                case FaultKind.RESET | FaultKind.POWER_DIP:
                     drive.power_up()
                     self._away_until_s[drive.node_id] = until_s
-            case FaultKind.OVER_TEMPERATURE | FaultKind.OVERLOAD:
-                code = _OVERLOAD if fault.kind is FaultKind.OVERLOAD else _OVER_TEMPERATURE
-                self._ailing |= {drive.node_id: (code, until_s) for drive in concerned}
-            case FaultKind.ENCODER_JUMP:
-                for drive in concerned:
-                    joint = self.drives.index(drive)
-                    self.arm.encoder_offset[joint] += fault.counts / drive.scale.counts_per_radian
-            case _:
-                for drive in concerned:
+                case FaultKind.OVER_TEMPERATURE | FaultKind.OVERLOAD:
+                    code = _OVERLOAD if fault.kind is FaultKind.OVERLOAD else _OVER_TEMPERATURE
+                    self._ailing[drive.node_id] = code, until_s
+                case FaultKind.ENCODER_JUMP:
+                    slip = fault.counts / drive.scale.counts_per_radian
+                    self.arm.encoder_offset[self.drives.index(drive)] += slip
+                case _:
                     self._wire.faults[drive.node_id] = AnswerFaults(fault.kind, fault.count, fault.seconds)
 
     def _let_ail(self, drive: EmulatedDrive) -> None:

@@ -186,16 +186,15 @@ class ProcessData:
             entries[mapping, subindex] = Entry(4, hook=partial(self._require_mappable, mapping))
         return _Pdo(cob_id, transmission, mapping)
 
-    def take(self, identifier: int, payload: bytes) -> bool:
-        """Keep a frame for the next SYNC; False where it is no RPDO of this node."""
+    def take(self, identifier: int, payload: bytes) -> None:
+        """Keep a frame for the next SYNC where it is an RPDO of this node."""
         for number, pdo in enumerate(self._received):
             if pdo.identifier == identifier:
                 if pdo.transmission.value <= _HIGHEST_SYNCHRONOUS:
                     self._waiting[number] = payload
                 else:
                     self._apply(pdo, payload)
-                return True
-        return False
+                return
 
     def synchronise(self) -> list[tuple[int, bytes]]:
         """Apply what waited, and sample the frames that this SYNC asks for: identifiers and payloads."""
