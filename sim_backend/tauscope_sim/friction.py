@@ -26,8 +26,8 @@ def static_friction_torque(
         )
     k_v, delta = np.array(shape_constants(friction, friction_shape)).T
     stiction, stribeck, viscous = np.array([(one.stiction, one.stribeck, one.viscous) for one in friction]).T
-    sliding = (stiction * np.arctan(k_v * velocity) + stribeck * np.arctan(delta * velocity)) / (0.5 * math.pi)
-    return sliding + viscous * velocity
+    coulomb = stiction * np.arctan(k_v * velocity) / (0.5 * math.pi)
+    return coulomb + stribeck * np.arctan(delta * velocity) / (0.5 * math.pi) + viscous * velocity
 
 
 def shape_constants(

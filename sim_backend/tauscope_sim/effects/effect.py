@@ -76,9 +76,10 @@ class ScenarioEntry(Document):
 
     def check(self, robot: Robot) -> None:
         """Refuse an entry that this robot cannot have. Raises ScenarioError naming effect and key."""
-        joint = getattr(self, "joint", None)
-        if joint is not None and joint > robot.joint_count:
-            raise self.refused("joint", f"is {joint}, but the arm has {robot.joint_count} joints")
+        for key, kind in (("joint", "joints"), ("other_joint", "joints"), ("link", "links")):
+            number = getattr(self, key, None)
+            if number is not None and number > robot.joint_count:
+                raise self.refused(key, f"is {number}, but the arm has {robot.joint_count} {kind}")
 
     def refused(self, key: str, text: str) -> ScenarioError:
         return ScenarioError(f"{self.effect_id}.{key}: {text}")
