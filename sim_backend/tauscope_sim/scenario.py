@@ -1,6 +1,7 @@
 """What a simulated arm conceals: effects, noise and delays, as a scenario file states them."""
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -8,10 +9,6 @@ from tauscope.robot.robot import Array, Robot
 from tauscope_sim.effects import Effect, SensorEffect
 from tauscope_sim.plant import Plant
 from tauscope_sim.plant.plant import STEP
-
-
-def _zero() -> Array:
-    return np.zeros(())
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,9 +21,11 @@ class Scenario:
 
     effects: tuple[Effect, ...] = ()
     sensor_effects: tuple[SensorEffect, ...] = ()
-    torque_noise_std: Array = field(default_factory=_zero)
-    position_noise_std: Array = field(default_factory=_zero)  # (n,) or (), of the recorded position's [rad or m]
-    encoder_step: Array = field(default_factory=_zero)
+    torque_noise_std: Array = field(default_factory=partial(np.zeros, ()))
+    position_noise_std: Array = field(
+        default_factory=partial(np.zeros, ())
+    )  # (n,) or (), of the recorded position's [rad or m]
+    encoder_step: Array = field(default_factory=partial(np.zeros, ()))
     command_latency_s: float = 0.0  # time from a setpoint's arrival to its effect [s]
     seed: int = 0
 
@@ -44,7 +43,7 @@ class Scenario:
 
 
 def quantise(position: Array, step: Array) -> Array:
-    """The nearest multiples of a resolution. `step`: (n,), zero for none [rad or m]."""
+    """The nearest multiples of a resolution. `position`: (n,) or (N, n); `step`: (n,), zero for none [rad or m]."""
     coarse = np.where(step > 0.0, step, 1.0)
     return np.where(step > 0.0, np.rint(position / coarse) * coarse, position)
 
