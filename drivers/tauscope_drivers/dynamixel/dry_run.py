@@ -19,6 +19,8 @@ from tauscope_drivers.inspection import FrameRequest, PlannedFrame
 from tauscope_drivers.limits import require_sensible
 from tauscope_drivers.state import Setpoint
 
+_frame = PlannedFrame.on_serial_bus
+
 # settings of a servo of the X series as delivered, but for a Current Limit that limits nothing
 _DELIVERED = {
     **dict.fromkeys(preparation.SETTINGS, 0),
@@ -104,7 +106,3 @@ def _writes(servo: JointServo, phase: str, writes: Iterable[preparation.Register
     for write in writes:
         frame = packets.encode_write(servo.servo, write.item.address, write.item.encode(write.value))
         yield _frame(phase, f"{servo.label}: {write.item.name} := {write.value}, {write.reason}", frame)
-
-
-def _frame(phase: str, meaning: str, frame: bytes) -> PlannedFrame:
-    return PlannedFrame(phase, meaning, frame.hex(" ").upper())
