@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -149,7 +150,7 @@ class DynamixelArm(SerialServoArm[Session]):
         """Hold an arm that leaves its limits while it is given current: its servos would let it."""
         if self._watch is None or session.health.runaway is not None:
             return
-        session.health.runaway = self._watch.look(reading.position, reading.velocity)
+        session.health.runaway = self._watch.look(reading.state.position, reading.state.velocity)
         if session.health.runaway is None:
             return
         try:
@@ -186,13 +187,4 @@ def _arm_state(session: Session, reading: GroupReading, temperature: Array) -> A
     for joint, alert in enumerate(reading.alerts):
         if alert is not None:
             session.health.alerts[joint] = alert
-    return ArmState(
-        time_ns=reading.time_ns,
-        position=reading.position,
-        velocity=reading.velocity,
-        effort=reading.current,
-        temperature=temperature,
-        enabled=session.enabled,
-        faults=session.health.faults,
-        late_ns=reading.late_ns,
-    )
+    return replace(reading.state, temperature=temperature, enabled=session.enabled, faults=session.health.faults)

@@ -71,9 +71,14 @@ def plan_tasks(
         settings = session.settings[joint]
         cap = preparation.current_cap(servo, settings, float(limits.torque[joint]))
         _require_in_own_range(session, joint, mode, present[joint])
-        low, high = _range(session, joint, limits, mode)
+        low, high = float(limits.position_low[joint]), float(limits.position_high[joint])
+        lowest, highest = preparation.position_counts(servo, settings, low, high, mode)
+        if lowest >= highest:
+            raise DriverError.refusal(
+                f"{servo.label}: its own Position Limits leave nothing of the range {low:.4g} to {high:.4g}; widen them"
+            )
         speed = preparation.velocity_cap(servo, settings, float(limits.velocity[joint]))
-        tasks.append(preparation.ServoTask(mode, cap, speed, present[joint], steps, low, high))
+        tasks.append(preparation.ServoTask(mode, cap, speed, present[joint], steps, lowest, highest))
         if session.health.has_torque[joint]:
             _require_adoptable(session, joint, mode)
     return tasks
@@ -92,17 +97,6 @@ def _take(session: Session, joint: int, task: preparation.ServoTask) -> int:
 
 def _present_position(session: Session, joint: int) -> int:
     return session.read(joint, ["Present Position"])["Present Position"]
-
-
-def _range(session: Session, joint: int, limits: DriveLimits, mode: ControlMode) -> tuple[int, int]:
-    low, high = float(limits.position_low[joint]), float(limits.position_high[joint])
-    servo = session.servos[joint]
-    lowest, highest = preparation.position_counts(servo, session.settings[joint], low, high, mode)
-    if lowest >= highest:
-        raise DriverError.refusal(
-            f"{servo.label}: its own Position Limits leave nothing of the range {low:.4g} to {high:.4g}; widen them"
-        )
-    return lowest, highest
 
 
 def _require_in_own_range(session: Session, joint: int, mode: ControlMode, present: int) -> None:
