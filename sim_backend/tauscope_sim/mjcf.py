@@ -211,7 +211,8 @@ class _Reader:
         return path
 
     def _joints_of(self, body: int) -> list[_Joint]:
-        return [joint for joint in self._joints if joint.body == body]
+        first, count = int(self._model.body_jntadr[body]), int(self._model.body_jntnum[body])
+        return self._joints[first : first + count] if count else []
 
     def _segments(
         self, path: list[int], moving: list[_Joint], motion: ChainMotion
