@@ -11,7 +11,7 @@ import can
 
 from tauscope_drivers.canopen.data_sheet.device_file import read_device_file
 from tauscope_drivers.drive_block import DriveJoint
-from tauscope_sim.canopen_bus.drive import REMOTE, AxisMeasurement, AxisMode, AxisScale, EmulatedDrive
+from tauscope_sim.canopen_bus.drive import REMOTE, AxisMode, AxisScale, EmulatedDrive
 
 GEAR = 50.0
 COUNTS_PER_TURN = 65536
@@ -78,4 +78,4 @@ class EmulatedBus:
         if demand.mode is AxisMode.POSITION:
             self.position[index] = demand.position
         self.furthest[index] = max(self.furthest[index], abs(self.position[index] - START[index]))
-        drive.measure(AxisMeasurement(self.position[index], 0.0, 1.5))
+        drive.measure(self.position[index], 0.0, 1.5)

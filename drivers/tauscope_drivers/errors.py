@@ -1,5 +1,6 @@
 """What a backend raises, and how it describes a fault of a drive."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Self
@@ -17,6 +18,20 @@ class Fault:
     def __str__(self) -> str:
         place = "arm" if self.joint is None else f"joint {self.joint}"
         return f"{place}: {self.detail} ({self.code}); {self.remedy}"
+
+
+def decode_bits(
+    bits: Sequence[tuple[int, str, str, str]], register: int, joint: int, name: str, unknown_remedy: str
+) -> tuple[Fault, ...]:
+    """Faults of a register; empty for 0. `bits`: each with code, meaning and remedy; `joint`: from 1."""
+    stated = f"{name} 0x{register:02X}"
+    found = tuple(
+        Fault(code, joint, f"{meaning}, {stated}", remedy) for bit, code, meaning, remedy in bits if register & bit
+    )
+    return found or (() if not register else (Fault("drive", joint, stated, unknown_remedy),))
+
+
+HOST_REMEDY = "make sure the host runs, then acknowledge"  # of a host that fell silent
 
 
 class DriverErrorKind(StrEnum):

@@ -56,6 +56,11 @@ class PlannedFrame:
     meaning: str
     wire: str  # as the bus's own tools write it: bytes in hexadecimal on a serial bus, ``201#0F00`` on CAN
 
+    @staticmethod
+    def on_serial_bus(phase: str, meaning: str, frame: bytes) -> "PlannedFrame":
+        """A frame of bytes."""
+        return PlannedFrame(phase, meaning, frame.hex(" ").upper())
+
 
 PHASES = ("connect", "enable", "cycle", "stop")  # in the order in which a run goes through them
 

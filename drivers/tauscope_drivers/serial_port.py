@@ -149,17 +149,12 @@ def find_holder(path: str) -> str | None:
 
 
 def _has_open(process: Path, device: int) -> bool:
-    try:
-        return any(_device(descriptor) == device for descriptor in (process / "fd").iterdir())
-    except OSError:
-        return False
-
-
-def _device(descriptor: Path) -> int | None:
-    try:
-        return os.stat(descriptor).st_rdev or None
-    except OSError:
-        return None
+    with contextlib.suppress(OSError):
+        for descriptor in (process / "fd").iterdir():
+            with contextlib.suppress(OSError):
+                if device and os.stat(descriptor).st_rdev == device:
+                    return True
+    return False
 
 
 def _name(process: Path) -> str:

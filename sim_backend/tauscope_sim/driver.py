@@ -9,9 +9,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -127,19 +126,14 @@ _LONGEST_SOCKET_PATH = 107
 
 
 @dataclass(frozen=True, eq=False)
-class DeviceProcess:
+class DeviceProcess(contextlib.AbstractContextManager["DeviceProcess"]):
     """A running device process."""
 
     process: "subprocess.Popen[bytes]"
     socket: Path
     trace: Path
 
-    def __enter__(self) -> "DeviceProcess":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.end()
 
     def end(self) -> None:
@@ -368,8 +362,7 @@ class RemoteSimulatedArm:
         return state
 
     def _miss(self) -> ArmState:
-        nothing = np.full(self._count, np.nan)
-        return ArmState(self.clock.now_ns(), nothing, nothing, nothing, nothing, self._enabled)
+        return replace(ArmState.unknown(self.clock.now_ns(), self._count), enabled=self._enabled)
 
     def _lose(self, reason: str) -> DriverError:
         self._close()

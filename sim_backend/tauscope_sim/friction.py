@@ -24,14 +24,10 @@ def static_friction_torque(
             f"friction has {len(friction)} and friction_shape {len(friction_shape)} entries; "
             f"the arm has {joint_count} joints: give one entry a joint"
         )
-    constants = shape_constants(friction, friction_shape)
-    torque = np.empty_like(velocity)
-    for column, (coefficients, (k_v, delta)) in enumerate(zip(friction, constants, strict=True)):
-        speed = velocity[:, column]
-        stiction = coefficients.stiction * np.arctan(k_v * speed) / (0.5 * math.pi)
-        stribeck = coefficients.stribeck * np.arctan(delta * speed) / (0.5 * math.pi)
-        torque[:, column] = stiction + stribeck + coefficients.viscous * speed
-    return torque
+    k_v, delta = np.array(shape_constants(friction, friction_shape)).T
+    stiction, stribeck, viscous = np.array([(one.stiction, one.stribeck, one.viscous) for one in friction]).T
+    coulomb = stiction * np.arctan(k_v * velocity) / (0.5 * math.pi)
+    return coulomb + stribeck * np.arctan(delta * velocity) / (0.5 * math.pi) + viscous * velocity
 
 
 def shape_constants(

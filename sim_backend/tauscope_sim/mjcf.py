@@ -27,11 +27,11 @@ from tauscope.robot.kinematics import compose, joint_displacement, rotation_of_z
 from tauscope.robot.messages import Finding, Severity, nearest, shown
 from tauscope.robot.robot import Array, FrictionCoefficients, JointLimits, JointType, LinkInertia, Placement, Segment
 from tauscope.robot.urdf_xml import inertia_about_frame
+from tauscope_sim.mujoco_log import list_actuators
 
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 CHOSEN_STD = 0.2  # relative standard error of an MJCF's gains: most are chosen so that the arm looks right
 
-OF_JOINT = int(mujoco.mjtTrn.mjTRN_JOINT)
 MOTOR, LOOP = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE)  # what actuators add by themselves
 _ALONG_Z = np.array([0.0, 0.0, 1.0])
 
@@ -202,16 +202,13 @@ class _Reader:
         return chain[::-1] if base is None or body == base else []
 
     def _path(self, base: int, tip: int) -> list[int]:
-        path, body = [], tip
-        while body != base:
-            if not body:
-                names = shown(self._body_names[tip]), shown(self._body_names[base])
-                raise self._error(f"the tip {names[0]} does not hang on the base {names[1]}; name bodies of one chain")
-            path.append(body)
-            body = int(self._model.body_parentid[body])
+        path = self._above(tip, base)
+        if not path and tip != base:
+            names = shown(self._body_names[tip]), shown(self._body_names[base])
+            raise self._error(f"the tip {names[0]} does not hang on the base {names[1]}; name bodies of one chain")
         if len(path) > MOST_JOINTS:
             raise self._error(f"the chain has {len(path)} bodies, more than {MOST_JOINTS}")
-        return path[::-1]
+        return path
 
     def _joints_of(self, body: int) -> list[_Joint]:
         first, count = int(self._model.body_jntadr[body]), int(self._model.body_jntnum[body])
@@ -321,9 +318,7 @@ class _Reader:
         model, stated = self._model, {}
         for joint in moving:
             dof = int(model.jnt_dofadr[joint.index])
-            damping = float(model.dof_damping[dof])
-            for actuator in self._actuators_of(joint):
-                damping += float(model.actuator_damping[actuator]) * float(model.actuator_gear[actuator, 0]) ** 2
+            damping = float(model.dof_damping[dof]) + self._reflect(joint, model.actuator_damping)
             stated[joint.name] = (float(model.dof_frictionloss[dof]), damping)
             if model.jnt_stiffness[joint.index]:
                 text = f"has stiffness {float(model.jnt_stiffness[joint.index]):g}, which the model leaves out"
@@ -334,18 +329,16 @@ class _Reader:
 
     def _rotor_inertia(self, joint: _Joint) -> float:
         """Armature of a joint, and of its actuators times gear² [kg m² or kg]."""
-        model, total = self._model, float(self._model.dof_armature[self._model.jnt_dofadr[joint.index]])
-        for actuator in self._actuators_of(joint):
-            total += float(model.actuator_armature[actuator]) * float(model.actuator_gear[actuator, 0]) ** 2
-        return total
+        own = float(self._model.dof_armature[self._model.jnt_dofadr[joint.index]])
+        return own + self._reflect(joint, self._model.actuator_armature)
 
     def _actuators_of(self, joint: _Joint) -> list[int]:
-        model = self._model
-        return [
-            index
-            for index in range(model.nu)
-            if model.actuator_trntype[index] == OF_JOINT and model.actuator_trnid[index, 0] == joint.index
-        ]
+        return list_actuators(self._model, joint.index)
+
+    def _reflect(self, joint: _Joint, values: Array) -> float:
+        """Sum over a joint's actuators of a value times gear²."""
+        gears = self._model.actuator_gear[:, 0]
+        return sum(float(values[index]) * float(gears[index]) ** 2 for index in self._actuators_of(joint))
 
     def _actuator(self, joint: _Joint) -> Actuator | None:
         """Gains of a joint's actuator in joint units; of several the first that holds the position."""

@@ -100,14 +100,10 @@ def _fit_into_limits(
 
 
 def _largest_scale(joint: Joint, reach: float, speed: float, acceleration: float) -> float:
-    factors: list[float] = []
-    if joint.limits.position is not None:
-        low, high = joint.limits.position
-        factors.append(0.5 * (high - low) / reach)
-    if joint.limits.velocity is not None:
-        factors.append(joint.limits.velocity / speed)
-    if joint.limits.acceleration is not None:
-        factors.append(joint.limits.acceleration / acceleration)
+    limits = joint.limits
+    half_range = None if limits.position is None else 0.5 * (limits.position[1] - limits.position[0])
+    stated = ((half_range, reach), (limits.velocity, speed), (limits.acceleration, acceleration))
+    factors = [limit / most for limit, most in stated if limit is not None]
     if not factors:
         raise RobotFileError(
             f"joint {joint.name}: limits states neither position, velocity nor acceleration; state one to make a motion"

@@ -24,6 +24,12 @@ HINGE_OR_SLIDE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SL
 _GROUPS = ("q", "tau", "qd", "qref")
 
 
+def list_actuators(model: mujoco.MjModel, joint: int) -> list[int]:
+    """Actuators that drive a joint, by their indices. `joint`: its index."""
+    on_joint = model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
+    return np.flatnonzero(on_joint & (model.actuator_trnid[:, 0] == joint)).tolist()
+
+
 class MujocoLog:
     """Steps a simulation and keeps its joints' state before each step, the torque in it, and commands."""
 
@@ -38,7 +44,7 @@ class MujocoLog:
         self._model, self._data = model, data
         self._qpos = np.array([model.jnt_qposadr[place] for place in places])
         self._dof = np.array([model.jnt_dofadr[place] for place in places])
-        self._actuators = [self._actuator_of(place) for place in places]
+        self._actuators = [next(iter(list_actuators(model, place)), None) for place in places]
         self._rows: list[NDArray[np.float64]] = []
 
     def step(self, command: NDArray[np.float64] | None = None) -> None:
@@ -61,10 +67,3 @@ class MujocoLog:
         header = f"# joints: {', '.join(self.joints)}\n" + ",".join(names[place] for place in known)
         data = rows[:, [kept[place] for place in known]]
         np.savetxt(path, data, fmt="%.9g", delimiter=",", header=header, comments="", encoding="utf-8")
-
-    def _actuator_of(self, joint: int) -> int | None:
-        model, on_joint = self._model, int(mujoco.mjtTrn.mjTRN_JOINT)
-        for index in range(model.nu):
-            if model.actuator_trntype[index] == on_joint and model.actuator_trnid[index, 0] == joint:
-                return index
-        return None

@@ -17,6 +17,7 @@ from tauscope.robot.robot import Array, Joint, Robot
 from tauscope_sim.friction import static_friction_torque
 from tauscope_sim.model import build_model
 from tauscope_sim.motion import FourierMotion, MotionSamples
+from tauscope_sim.scenario import quantise
 
 
 def rigid_body_torque(model: mujoco.MjModel, position: Array, velocity: Array, acceleration: Array) -> Array:
@@ -75,17 +76,13 @@ def simulate_recording(
 
     one_period = motion.evaluate(np.arange(samples_per_period) / rate_hz)
     torque = _torque(robot, one_period)
-    exact = MotionSamples(
-        position=np.tile(one_period.position, (periods, 1)),
-        velocity=np.tile(one_period.velocity, (periods, 1)),
-        acceleration=np.tile(one_period.acceleration, (periods, 1)),
-    )
+    exact = MotionSamples(**{name: np.tile(each, (periods, 1)) for name, each in vars(one_period).items()})
     torque_exact = np.tile(torque, (periods, 1))
     shape = torque_exact.shape
     torque_noise, position_noise = rng.standard_normal(shape), rng.standard_normal(shape)
     return SimulatedRecording(
         time=np.arange(shape[0]) / rate_hz,
-        position=_quantise(exact.position + position_std * position_noise, step),
+        position=quantise(exact.position + position_std * position_noise, step),
         torque=torque_exact + torque_std * torque_noise,
         exact=exact,
         torque_exact=torque_exact,
@@ -124,13 +121,6 @@ def _torque(robot: Robot, samples: MotionSamples) -> Array:
         return torque
     shape = [joint.friction_shape for joint in robot.joints]
     return torque + static_friction_torque(samples.velocity, robot.model.friction, shape)
-
-
-def _quantise(position: Array, step: Array) -> Array:
-    rounded = position.copy()
-    coarse = step > 0.0
-    rounded[:, coarse] = np.rint(position[:, coarse] / step[coarse]) * step[coarse]
-    return rounded
 
 
 def write_recording_csv(

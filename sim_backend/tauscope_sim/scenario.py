@@ -1,6 +1,7 @@
 """What a simulated arm conceals: effects, noise and delays, as a scenario file states them."""
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -8,10 +9,6 @@ from tauscope.robot.robot import Array, Robot
 from tauscope_sim.effects import Effect, SensorEffect
 from tauscope_sim.plant import Plant
 from tauscope_sim.plant.plant import STEP
-
-
-def _zero() -> Array:
-    return np.zeros(())
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,9 +21,11 @@ class Scenario:
 
     effects: tuple[Effect, ...] = ()
     sensor_effects: tuple[SensorEffect, ...] = ()
-    torque_noise_std: Array = field(default_factory=_zero)
-    position_noise_std: Array = field(default_factory=_zero)  # (n,) or (), of the recorded position's [rad or m]
-    encoder_step: Array = field(default_factory=_zero)
+    torque_noise_std: Array = field(default_factory=partial(np.zeros, ()))
+    position_noise_std: Array = field(
+        default_factory=partial(np.zeros, ())
+    )  # (n,) or (), of the recorded position's [rad or m]
+    encoder_step: Array = field(default_factory=partial(np.zeros, ()))
     command_latency_s: float = 0.0  # time from a setpoint's arrival to its effect [s]
     seed: int = 0
 
@@ -43,6 +42,12 @@ class Scenario:
         return Sensors(self, robot.joint_count, np.random.default_rng(self.seed) if rng is None else rng)
 
 
+def quantise(position: Array, step: Array) -> Array:
+    """The nearest multiples of a resolution. `position`: (n,) or (N, n); `step`: (n,), zero for none [rad or m]."""
+    coarse = np.where(step > 0.0, step, 1.0)
+    return np.where(step > 0.0, np.rint(position / coarse) * coarse, position)
+
+
 class Sensors:
     """What a recording shows of the arm, sample by sample; causal, so that a control loop can use it."""
 
@@ -51,9 +56,7 @@ class Sensors:
         shape = (joint_count,)
         self._torque_std = np.broadcast_to(scenario.torque_noise_std, shape)
         self._position_std = np.broadcast_to(scenario.position_noise_std, shape)
-        step = np.broadcast_to(scenario.encoder_step, shape)
-        self._coarse = step > 0.0
-        self._step = np.where(self._coarse, step, 1.0)
+        self._step = np.broadcast_to(scenario.encoder_step, shape)
         self._rng = rng
 
     def measure(self, time: float, position: Array, torque: Array) -> tuple[Array, Array]:
@@ -61,6 +64,5 @@ class Sensors:
         for channel in self._channels:
             position, torque = channel.pass_on(time, position, torque)
         noise = self._rng.standard_normal((2, len(position)))
-        noisy = position + self._position_std * noise[0]
-        recorded = np.where(self._coarse, np.rint(noisy / self._step) * self._step, noisy)
+        recorded = quantise(position + self._position_std * noise[0], self._step)
         return recorded, torque + self._torque_std * noise[1]

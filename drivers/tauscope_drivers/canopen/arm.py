@@ -14,7 +14,8 @@ from tauscope_drivers.canopen.commissioning import commission_drive, write_setti
 from tauscope_drivers.canopen.configuration import read_configuration, require_targets
 from tauscope_drivers.canopen.emergency import HEARTBEAT_LOST
 from tauscope_drivers.canopen.node import BEATS, DriveNode
-from tauscope_drivers.canopen.session import SETTLING_CYCLE_S, Session, listed, possible_rate_hz, rate_limited_by
+from tauscope_drivers.canopen.process_data import largest_rate_hz, rate_limit
+from tauscope_drivers.canopen.session import SETTLING_CYCLE_S, Session, cycle_load, listed
 from tauscope_drivers.canopen.state_machine import Goal
 from tauscope_drivers.canopen.target_limiter import TargetLimiter
 from tauscope_drivers.clock import Clock, MonotonicClock
@@ -63,10 +64,10 @@ class CanopenArm:
             joint_count=len(self.configuration.nodes),
             modes=self._modes,
             stop_policies=frozenset(power.POLICY_GOALS),
-            largest_rate_hz=possible_rate_hz(self.configuration),
+            largest_rate_hz=largest_rate_hz(*cycle_load(self.configuration)),
             watchdog_range_s=WATCHDOG_RANGE_S,
             takes_feed_forward=False,
-            rate_limited_by=rate_limited_by(self.configuration),
+            rate_limited_by=rate_limit(*cycle_load(self.configuration)),
             holds_before_torque=False,
             remarks=() if self._session is None else self._session.remarks,
         )
@@ -193,21 +194,18 @@ class CanopenArm:
     def _open(self) -> Session:
         bus = CanBus(self.configuration, self._given_bus, self.clock)
         nodes = tuple(DriveNode.on_bus(bus, node, joint) for joint, node in enumerate(self.configuration.nodes, 1))
-        answer_s = 2.0 / possible_rate_hz(self.configuration) + self._patience_s
+        answer_s = 2.0 / largest_rate_hz(*cycle_load(self.configuration)) + self._patience_s
         return Session(bus, nodes, self.clock, round(answer_s * 1e9), self._caught)
 
     def _refuse_impossible(self, mode: ControlMode, policy: StopPolicy, watchdog_s: float) -> None:
-        reason = None
+        shortest, longest = WATCHDOG_RANGE_S
         if mode not in self._modes:
-            reason = f"not every drive has the cyclic synchronous {mode} mode (0x6502)"
-        elif policy not in power.POLICY_GOALS:
-            reason = f"drives cannot {policy} by themselves; choose hold or torque_off"
-        elif not WATCHDOG_RANGE_S[0] <= watchdog_s <= WATCHDOG_RANGE_S[1]:
-            reason = f"a watchdog of {watchdog_s:g} s is outside {WATCHDOG_RANGE_S[0]:g} to {WATCHDOG_RANGE_S[1]:g} s"
-        else:
-            require_targets(self.configuration, mode)
-        if reason is not None:
-            raise DriverError.refusal(reason)
+            raise DriverError.refusal(f"not every drive has the cyclic synchronous {mode} mode (0x6502)")
+        if policy not in power.POLICY_GOALS:
+            raise DriverError.refusal(f"drives cannot {policy} by themselves; choose hold or torque_off")
+        if not shortest <= watchdog_s <= longest:
+            raise DriverError.refusal(f"a watchdog of {watchdog_s:g} s is outside {shortest:g} to {longest:g} s")
+        require_targets(self.configuration, mode)
 
     def _require_session(self) -> Session:
         if self._session is None:

@@ -1,9 +1,10 @@
 """What a drive is told before it gets power: the values of its DCF file, mode, limits, watchdog, process data."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 
 from canopen.sdo.exceptions import SdoAbortedError
 
@@ -109,7 +110,7 @@ def commission_drive(
 def _choose(node: DriveNode, entry: DriveObject, values: Sequence[int]) -> int | None:
     """Write the first value that a drive takes; what it keeps otherwise, None where it has no such object."""
     for value in values if node.has(entry) else ():
-        if _takes(node, entry, value):
+        if _accepts(partial(node.dictionary.write, entry, value)):
             return value
     return node.dictionary.read_optional(entry)
 
@@ -137,20 +138,21 @@ def _tell_cycle(node: DriveNode, cycle_s: float) -> None:
     """Tell the time between two targets; a drive without this object finds it from SYNC."""
     if not node.has(objects.INTERPOLATION_VALUE):
         return
-    known = node.dictionary.read_optional(objects.INTERPOLATION_EXPONENT)
+    write, known = node.dictionary.write, node.dictionary.read_optional(objects.INTERPOLATION_EXPONENT)
     exponents = (_MILLISECONDS,) if known is None else _PERIOD_EXPONENTS
     try:
         value, exponent = interpolation_period(cycle_s, exponents)
-        if known not in (None, exponent) and not _takes(node, objects.INTERPOLATION_EXPONENT, exponent):
+        if known not in (None, exponent) and not _accepts(partial(write, objects.INTERPOLATION_EXPONENT, exponent)):
             value, _ = interpolation_period(cycle_s, (known,))
     except ValueError as error:
         raise DriverError.refusal(f"{node.place}: {error}; choose another rate") from error
-    node.dictionary.write(objects.INTERPOLATION_VALUE, value)
+    write(objects.INTERPOLATION_VALUE, value)
 
 
-def _takes(node: DriveNode, entry: DriveObject, value: int) -> bool:
+def _accepts(write: Callable[[], None]) -> bool:
+    """Whether a drive takes what is written; its silence is raised as always."""
     try:
-        node.dictionary.write(entry, value)
+        write()
     except DriverError as error:
         if error.kind is not DriverErrorKind.REFUSED:
             raise
@@ -227,7 +229,7 @@ def require_plan(node: DriveNode, mode: ControlMode) -> process_data.PdoPlan:
 def _write_pdo(node: DriveNode, pdo: process_data.Pdo) -> bool:
     """Set up one PDO; False where its mapping cannot be written, and is known as fixed from now on."""
     places = pdo.direction.parameters(pdo.number, len(pdo.layout.objects))
-    identifier = pdo.direction.identifier(pdo.number, node.configuration.node_id)
+    identifier = pdo.identifier(node.configuration.node_id)
     wanted = [entry.mapping for entry in pdo.layout.objects]
     if pdo.is_fixed:
         if read_mapping(node, places) != wanted:
@@ -250,18 +252,16 @@ def _write_pdo(node: DriveNode, pdo: process_data.Pdo) -> bool:
 
 def _map(node: DriveNode, places: process_data.PdoParameters, wanted: list[int]) -> bool:
     """Write a mapping in the order that CiA 301 asks for; False where the drive refuses it or keeps another one."""
-    write = node.dictionary.write
-    try:
-        write(places.count, 0)
-        for place, entry in zip(places.entries, wanted, strict=True):
-            node.dictionary.send(place, entry)
-        write(places.count, len(wanted))
-    except DriverError as error:
-        if error.kind is not DriverErrorKind.REFUSED:
-            raise
-        return False
+    content, dictionary = dict(zip(places.entries, wanted, strict=True)), node.dictionary
+
+    def write() -> None:
+        dictionary.write(places.count, 0)
+        for place, entry in content.items():
+            dictionary.send(place, entry)
+        dictionary.write(places.count, len(wanted))
+
     # some drives show them only when they count
-    return all(node.dictionary.read(place) == entry for place, entry in zip(places.entries, wanted, strict=True))
+    return _accepts(write) and all(dictionary.read(place) == entry for place, entry in content.items())
 
 
 def read_mapping(node: DriveNode, places: process_data.PdoParameters) -> list[int]:

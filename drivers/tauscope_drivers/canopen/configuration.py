@@ -74,7 +74,7 @@ def require_targets(configuration: BusConfiguration, mode: ControlMode) -> None:
         if node.device_file is None:
             continue
         try:
-            needs.require_target(node.device_file, mode)
+            needs.refuse(needs.find_target_flaws(node.device_file, mode))
         except DataSheetError as error:
             text = f"joint {joint} (node {node.node_id}): {node.device_file.name}: {error}"
             raise DriverError.refusal(text) from error
@@ -124,7 +124,7 @@ def _device_file(joint: drive_block.DriveJoint, node_id: int, *, reads_rated_tor
             raise DataSheetError(
                 f"is made for node {file.node_id}; correct drive.node_id, or give the file of this node"
             )
-        needs.require_needed(file, reads_rated_torque=reads_rated_torque)
+        needs.refuse(needs.find_flaws(file, reads_rated_torque=reads_rated_torque))
         settings_of(file)
     except DataSheetError as error:
         raise drive_block.refusal(joint, "eds", f"= {path!r}: {error}") from error

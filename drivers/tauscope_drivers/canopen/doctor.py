@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,8 @@ from tauscope_drivers.canopen.configuration import BusConfiguration, read_config
 from tauscope_drivers.canopen.data_sheet.device_file import DeviceFile, settings_of
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import DOUBTFUL, TARGETS
-from tauscope_drivers.canopen.process_data import decode_mapping
-from tauscope_drivers.canopen.session import possible_rate_hz
+from tauscope_drivers.canopen.process_data import decode_mapping, largest_rate_hz
+from tauscope_drivers.canopen.session import cycle_load
 from tauscope_drivers.canopen.state_machine import POWERED
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError
@@ -31,9 +32,7 @@ _CAN_DEVICE_TYPE = "280"
 def can_interfaces() -> list[Finding]:
     """Every CAN interface that this system's network knows, and whether it is up."""
     found: list[Finding] = []
-    if not _NETWORK.is_dir():
-        return found
-    for interface in sorted(_NETWORK.iterdir()):
+    for interface in sorted(_NETWORK.glob("*")):
         if _read(interface / "type") != _CAN_DEVICE_TYPE:
             continue
         name = interface.name
@@ -50,16 +49,11 @@ def examine(joints: Sequence[DriveJoint]) -> list[Finding]:
     configuration = read_configuration(joints)
     subject = f"{configuration.interface} {configuration.channel}"
     try:
-        bus = CanBus(configuration)
+        with closing(CanBus(configuration)) as bus:
+            opened = Finding(Severity.GOOD, subject, f"open, {configuration.bit_rate / 1e3:g} kbit/s")
+            return [opened, *_examine_drives(bus, configuration, joints, subject)]
     except DriverError as error:
         return [failure(subject, str(error))]
-    try:
-        findings = [Finding(Severity.GOOD, subject, f"open, {configuration.bit_rate / 1e3:g} kbit/s")]
-        return findings + _examine_drives(bus, configuration, joints, subject)
-    except DriverError as error:
-        return [failure(subject, str(error))]
-    finally:
-        bus.close()
 
 
 def _examine_drives(
@@ -95,8 +89,7 @@ def _examine_drive(node: DriveNode, joint: DriveJoint) -> list[Finding]:
         severity = Severity.FAILURE if len(missing) == len(TARGETS) else Severity.WARNING
         findings.append(Finding(severity, node.place, detail, "run the arm in the other mode, or update its firmware"))
     node.read_now()
-    for fault in node.faults():
-        findings.append(Finding(Severity.FAILURE, node.place, fault.detail, fault.remedy))
+    findings += [Finding(Severity.FAILURE, node.place, fault.detail, fault.remedy) for fault in node.faults()]
     if node.state in POWERED:
         remedy = "none where it holds the arm; else support the arm and switch it off"
         findings.append(Finding(Severity.WARNING, node.place, f"is under power: {node.state}", remedy))
@@ -140,7 +133,7 @@ def _loop_rate(configuration: BusConfiguration, nodes: Sequence[DriveNode], subj
     for read in range(MEASURED_READS):
         nodes[read % len(nodes)].dictionary.read(objects.STATUSWORD)
     round_trip_ms = (time.monotonic_ns() - begin_ns) * 1e-6 / MEASURED_READS
-    possible = possible_rate_hz(configuration)
+    possible = largest_rate_hz(*cycle_load(configuration))
     detail = f"a question is answered in {round_trip_ms:.2f} ms; a whole cycle gets {possible:.0f} Hz at most"
     return Finding(Severity.GOOD, subject, detail)
 
@@ -170,15 +163,12 @@ def scan_bus(interface: str, channel: str, bit_rates: Sequence[int] | None = Non
     if bit_rates is None:
         bit_rates = USUAL_BIT_RATES[:1] if interface in _FIXED_RATE else USUAL_BIT_RATES
     for bit_rate in bit_rates:
-        bus = CanBus(BusConfiguration((), interface, channel, bit_rate))
-        try:
+        with closing(CanBus(BusConfiguration((), interface, channel, bit_rate))) as bus:
             for node, device_type in sorted(_answers(bus).items()):
                 dictionary = bus.add_node(node)
                 name, version = map(dictionary.read_text, (objects.DEVICE_NAME, objects.SOFTWARE_VERSION))
                 profile = f"profile {device_type & 0xFFFF}"
                 yield FoundDevice(node, bit_rate, f"{name} ({profile})" if name else profile, version)
-        finally:
-            bus.close()
 
 
 def _answers(bus: CanBus) -> dict[int, int]:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import override
 
 from tauscope_drivers.backend import ControlMode, StopPolicy
 from tauscope_drivers.canopen import bus, objects
@@ -13,6 +14,7 @@ from tauscope_drivers.canopen.configuration import NodeConfiguration, read_confi
 from tauscope_drivers.canopen.data_sheet.needs import needs_guarding, pdo_slots, present_objects
 from tauscope_drivers.canopen.node import DriveNode
 from tauscope_drivers.canopen.objects import DriveObject, select_modes
+from tauscope_drivers.canopen.sdo import NodeDictionary
 from tauscope_drivers.canopen.state_machine import DriveState, Goal, next_controlword
 from tauscope_drivers.canopen.units import drive_units
 from tauscope_drivers.drive_block import DriveJoint
@@ -23,40 +25,29 @@ from tauscope_drivers.limits import require_sensible
 _TO_POWER = (DriveState.SWITCH_ON_DISABLED, DriveState.READY, DriveState.SWITCHED_ON)
 _DOWNLOAD, _LONG_DOWNLOAD, _UPLOAD = 0x23, 0x21, 0x40
 _ALL_MODES = 0xFFFF
-_AS_DELIVERED = {objects.LARGEST_TORQUE: 0xFFFF, objects.INTERPOLATION_VALUE: 1, objects.INTERPOLATION_EXPONENT: -3}
+_AS_DELIVERED = {
+    objects.LARGEST_TORQUE: b"\xff\xff",
+    objects.INTERPOLATION_VALUE: b"\x01",
+    objects.INTERPOLATION_EXPONENT: b"\xfd",  # milliseconds
+}
 
 
-class _PlannedDictionary:
-    """Stands in for a node's object dictionary: keeps what is written and turns it into frames."""
+class _PlannedDictionary(NodeDictionary):
+    """A node's object dictionary without a bus: keeps what is written and turns it into frames."""
 
     def __init__(self, configuration: NodeConfiguration, label: str) -> None:
         self.frames: list[PlannedFrame] = []
         self.node_id = configuration.node_id
         self._label = label
-        self._values = dict(_AS_DELIVERED)
-        self._data: dict[DriveObject, bytes] = {}
+        self._data = dict(_AS_DELIVERED)
         self.guarded: set[int] = set()
 
-    def read(self, entry: DriveObject) -> int:
-        request = bytes([_UPLOAD]) + _place(entry) + bytes(4)
-        self._add(f"{entry}?", request)
-        return self._values.get(entry, 0)
-
+    @override
     def read_data(self, entry: DriveObject) -> bytes:
-        self.read(entry)
+        self._add(f"{entry}?", bytes([_UPLOAD]) + _place(entry) + bytes(4))
         return self._data.get(entry, b"")
 
-    def read_optional(self, entry: DriveObject) -> int:
-        return self.read(entry)
-
-    def write(self, entry: DriveObject, value: int) -> None:
-        self.send(entry, value)
-        self.read(entry)
-
-    def send(self, entry: DriveObject, value: int) -> None:
-        self._values[entry] = value
-        self.send_data(entry, value.to_bytes(entry.bits // 8, "little", signed=entry.signed), str(value))
-
+    @override
     def send_data(self, entry: DriveObject, data: bytes, text: str) -> None:
         self._data[entry] = data
         if len(data) > 4:
@@ -115,8 +106,8 @@ def _plan_node(joint: int, configuration: NodeConfiguration) -> tuple[DriveNode,
             f"{label}: only the drive knows its rated torque (0x6076); state drive.rated_torque_nm for a dry run"
         )
     dictionary = _PlannedDictionary(configuration, label)
-    stand_in: Any = dictionary
-    node = DriveNode(configuration, joint, stand_in, bus=stand_in)
+    bus_too: Any = dictionary
+    node = DriveNode(configuration, joint, dictionary, bus=bus_too)
     node.units = drive_units(configuration, configuration.rated_torque_nm)
     node.mode_numbers = select_modes(_ALL_MODES)
     if configuration.device_file is not None:

@@ -1,8 +1,6 @@
 """Emergency messages and the error codes behind them (CiA 301, CiA 402), in words with a remedy."""
 
-from tauscope_drivers.errors import Fault
-
-_LENGTH = 8
+from tauscope_drivers.errors import HOST_REMEDY, Fault
 
 HEARTBEAT_LOST = 0x8130  # error code of a drive that misses the master
 WATCHDOG_CODE = "watchdog"  # `Fault.code` of a host that fell silent
@@ -26,13 +24,7 @@ _MEANINGS: tuple[tuple[int, int, str, str, str], ...] = (
     (0xFFFF, 0x7121, "overload", "motor blocked", "free the joint, then acknowledge"),
     (0xFF00, 0x7300, "encoder", "position sensor fault", "check the encoder and its cable"),
     (0xF000, 0x7000, "module", "fault of a further module of the drive", _MANUAL),
-    (
-        0xFFFF,
-        HEARTBEAT_LOST,
-        WATCHDOG_CODE,
-        "the master's heartbeat stayed away",
-        "make sure the host runs, then acknowledge",
-    ),
+    (0xFFFF, HEARTBEAT_LOST, WATCHDOG_CODE, "the master's heartbeat stayed away", HOST_REMEDY),
     (0xFFFF, 0x8140, "bus", "the drive came back from bus-off", "check the cable and both terminators"),
     (0xFF00, 0x8100, "bus", "communication fault", "check the cable, the terminators and the bit rate"),
     (0xFF00, 0x8400, "over-speed", "faster than allowed", "move slower, then acknowledge"),
@@ -45,7 +37,7 @@ _MEANINGS: tuple[tuple[int, int, str, str, str], ...] = (
 
 def decode_emergency(payload: bytes) -> int | None:
     """Error code of an emergency message; None where its length is not eight bytes."""
-    return int.from_bytes(payload[:2], "little") if len(payload) == _LENGTH else None
+    return int.from_bytes(payload[:2], "little") if len(payload) == 8 else None
 
 
 def describe_error(code: int, joint: int) -> Fault | None:

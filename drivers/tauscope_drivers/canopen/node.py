@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.canopen import objects, process_data
@@ -57,8 +58,7 @@ _CIA_402 = 402
 _INTERPOLATE = 0x10  # bit of the controlword that starts interpolation, in the mode of that name
 
 
-@dataclass(frozen=True)
-class Measurement:
+class Measurement(NamedTuple):
     """Of a joint, by its drive; NaN where it did not come."""
 
     position: float  # [rad or m]
@@ -78,7 +78,7 @@ class DriveNode:
     values: dict[DriveObject, int] = field(default_factory=dict)
     error_code: int = 0
     acknowledged_code: int = 0
-    measurement: Measurement = Measurement(math.nan, math.nan, math.nan)
+    measurement: Measurement = field(default=Measurement(math.nan, math.nan, math.nan))
     last_state: DriveState | None = None
     last_position: float = math.nan
     last_velocity: float = 0.0  # of the joint when it last told one [rad/s or m/s]
@@ -129,7 +129,7 @@ class DriveNode:
         """Listen to the frames of a plan from now on."""
         self.plan = plan
         for pdo in plan.sent:
-            identifier = pdo.direction.identifier(pdo.number, self.configuration.node_id)
+            identifier = pdo.identifier(self.configuration.node_id)
             self.bus.subscribe(identifier, lambda _, data, layout=pdo.layout: self._take(layout, data))
 
     def identify(self) -> frozenset[ControlMode]:
@@ -188,13 +188,8 @@ class DriveNode:
             controlword |= _INTERPOLATE
         values = {**self.held, objects.CONTROLWORD: controlword, target: quantity}
         try:
-            return [
-                (
-                    pdo.direction.identifier(pdo.number, self.configuration.node_id),
-                    process_data.encode_pdo(pdo.layout, values),
-                )
-                for pdo in self.plan.received
-            ]
+            node_id, received = self.configuration.node_id, self.plan.received
+            return [(pdo.identifier(node_id), process_data.encode_pdo(pdo.layout, values)) for pdo in received]
         except OverflowError as error:
             raise DriverError.refusal(f"{self.place}: {error}; check counts_per_turn") from error
 

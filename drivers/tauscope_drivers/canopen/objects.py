@@ -30,7 +30,6 @@ class DriveObject:
 
 
 DEVICE_TYPE = DriveObject("Device type", 0x1000, 0, 32)
-ERROR_REGISTER = DriveObject("Error register", 0x1001, 0, 8)
 DEVICE_NAME = DriveObject("Device name", 0x1008, 0, 0)
 SOFTWARE_VERSION = DriveObject("Software version", 0x100A, 0, 0)
 GUARD_TIME = DriveObject("Guard time", 0x100C, 0, 16)
@@ -50,7 +49,6 @@ FAULT_REACTION_OPTION = DriveObject("Fault reaction option code", 0x605E, 0, 16,
 MODE_OF_OPERATION = DriveObject("Modes of operation", 0x6060, 0, 8, signed=True)
 MODE_DISPLAY = DriveObject("Modes of operation display", 0x6061, 0, 8, signed=True)
 POSITION_ACTUAL = DriveObject("Position actual value", 0x6064, 0, 32, signed=True)
-FOLLOWING_WINDOW = DriveObject("Following error window", 0x6065, 0, 32)
 VELOCITY_ACTUAL = DriveObject("Velocity actual value", 0x606C, 0, 32, signed=True)
 TARGET_TORQUE = DriveObject("Target torque", 0x6071, 0, 16, signed=True)
 LARGEST_TORQUE = DriveObject("Max torque", 0x6072, 0, 16)

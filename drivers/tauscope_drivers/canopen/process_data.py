@@ -118,6 +118,10 @@ class Pdo:
     layout: PdoLayout
     is_fixed: bool = False
 
+    def identifier(self, node_id: int) -> int:
+        """Of its frames."""
+        return self.direction.identifier(self.number, node_id)
+
 
 @dataclass(frozen=True)
 class PdoPlan:
@@ -190,8 +194,6 @@ LARGEST_LOAD = 0.8  # share of the bus that cyclic frames may take; the rest is 
 ASCII_FRAME_BYTES = 22
 HIGHEST_BIT_RATE = 1e6  # of classical CAN [bit/s]
 
-_SYNC_BYTES = 0
-
 
 def frame_bits(payload_bytes: int) -> int:
     """Longest standard data frame: 47 + 8 d + ⌊(34 + 8 d − 1)/4⌋ bits, space between frames included; d bytes."""
@@ -200,7 +202,7 @@ def frame_bits(payload_bytes: int) -> int:
 
 def cycle_bits(nodes: int, payloads: Sequence[int]) -> int:
     """Bits of one cycle: SYNC and every node's PDOs. `payloads`: of the PDOs of one node [bytes]."""
-    return frame_bits(_SYNC_BYTES) + nodes * sum(map(frame_bits, payloads))
+    return frame_bits(0) + nodes * sum(map(frame_bits, payloads))
 
 
 def largest_rate_hz(nodes: int, payloads: Sequence[int], bit_rate: float, serial_baud: float | None = None) -> float:

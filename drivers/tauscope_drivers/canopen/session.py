@@ -14,7 +14,7 @@ from tauscope_drivers.canopen.bus import NMT_PRE_OPERATIONAL, SYNC_ID, CanBus
 from tauscope_drivers.canopen.configuration import BusConfiguration
 from tauscope_drivers.canopen.emergency import WATCHDOG_CODE
 from tauscope_drivers.canopen.node import DriveNode
-from tauscope_drivers.canopen.process_data import MEASURED_WHERE_THERE, PdoSlots, largest_rate_hz, plan_pdos, rate_limit
+from tauscope_drivers.canopen.process_data import MEASURED_WHERE_THERE, PdoSlots, plan_pdos
 from tauscope_drivers.canopen.state_machine import POWERED, DriveState, Goal, decode_state
 from tauscope_drivers.clock import AnswerTime, Clock
 from tauscope_drivers.errors import Fault
@@ -61,14 +61,9 @@ CYCLE_FRAMES = tuple(pdo.layout.size for pdo in (*_PLAN.received, *_PLAN.sent))
 SETTLING_CYCLE_S = 0.01
 
 
-def possible_rate_hz(configuration: BusConfiguration) -> float:
-    """Most cycles a second that bus and adapter carry [Hz]."""
-    return largest_rate_hz(len(configuration.nodes), CYCLE_FRAMES, configuration.bit_rate, configuration.serial_baud)
-
-
-def rate_limited_by(configuration: BusConfiguration) -> str:
-    """What keeps the rate from being higher, and what to do about it."""
-    return rate_limit(len(configuration.nodes), CYCLE_FRAMES, configuration.bit_rate, configuration.serial_baud)
+def cycle_load(configuration: BusConfiguration) -> tuple[int, Sequence[int], float, float | None]:
+    """Nodes, payloads of each, bit rate and serial line: the arguments of `largest_rate_hz` and `rate_limit`."""
+    return len(configuration.nodes), CYCLE_FRAMES, configuration.bit_rate, configuration.serial_baud
 
 
 @dataclass
@@ -157,12 +152,12 @@ class Session:
         """The arm by what its drives sent since they were asked, in joint units; NaN where one did not answer."""
         for node in self.nodes:
             node.remember(time_ns)
-        measured = [node.measurement for node in self.nodes]
+        position, velocity, effort = np.array([node.measurement for node in self.nodes]).T
         return ArmState(
             time_ns=time_ns,
-            position=np.array([one.position for one in measured]),
-            velocity=np.array([one.velocity for one in measured]),
-            effort=np.array([one.effort for one in measured]),
+            position=position,
+            velocity=velocity,
+            effort=effort,
             temperature=np.full(len(self.nodes), math.nan),
             # of a node that did not answer, as it last told: whether it is missed is what NaN says
             enabled=np.array([node.last_state in POWERED for node in self.nodes]),

@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,9 +12,9 @@ from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.dynamixel.bus import ServoBus, count_traffic, has_room_for_speeds, planned_budget
 from tauscope_drivers.dynamixel.configuration import read_configuration
 from tauscope_drivers.dynamixel.control_table import WATCHDOG_MOST, WATCHDOG_STEP_S
-from tauscope_drivers.dynamixel.enabling import Bounds, enable_servos, goals_of
+from tauscope_drivers.dynamixel.enabling import enable_servos, goals_of
 from tauscope_drivers.dynamixel.group import GroupReading
-from tauscope_drivers.dynamixel.preparation import commissioning_writes
+from tauscope_drivers.dynamixel.preparation import ServoTask, commissioning_writes
 from tauscope_drivers.dynamixel.session import Session, open_session
 from tauscope_drivers.dynamixel.stopping import clear_errors, clear_watchdogs, stop_servos
 from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
@@ -48,7 +49,7 @@ class DynamixelArm(SerialServoArm[Session]):
         """Nothing is opened yet. Raises DriverError ``refused``. `keeps_settings`: changes of EEPROM stay."""
         super().__init__(read_configuration(joints), slack_s, clock)
         self._keeps_settings = keeps_settings
-        self._bounds = Bounds((), (), (), ())
+        self._tasks: list[ServoTask] = []
         self._watch: RunawayWatch | None = None
         self._last_goals: list[int] | None = None
 
@@ -106,17 +107,17 @@ class DynamixelArm(SerialServoArm[Session]):
     def _take_under_power(
         self, session: Session, mode: ControlMode, limits: DriveLimits, watchdog_s: float, cycle_s: float | None
     ) -> GoalPace | None:
-        self._bounds, held = enable_servos(session, mode, limits, watchdog_s)
+        self._tasks, held = enable_servos(session, mode, limits, watchdog_s)
         session.health.expect_torque(True)
         self._watch = RunawayWatch(limits) if mode is ControlMode.TORQUE else None
         self._last_goals = None
         if mode is ControlMode.TORQUE or cycle_s is None or not has_room_for_speeds(*self._budget(), cycle_s):
             return None
-        return GoalPace(session.servos, held, self._bounds.velocity, cycle_s, self.clock.now_ns())
+        return GoalPace(session.servos, held, [task.velocity_cap for task in self._tasks], cycle_s, self.clock.now_ns())
 
     def _cycle(self, session: Session, mode: ControlMode, setpoint: Setpoint) -> ArmState:
         """Sync Write of the goals, Sync Read of all servos, health of one servo."""
-        name, goals = goals_of(session.servos, mode, self._bounds, setpoint)
+        name, goals = goals_of(session.servos, mode, self._tasks, setpoint)
         silence_s = (self.clock.now_ns() - self._last_exchange_ns) * 1e-9
         if session.health.runaway is None:
             if self._pace is None:
@@ -136,7 +137,7 @@ class DynamixelArm(SerialServoArm[Session]):
         return _arm_state(session, reading, temperature)
 
     def _stop(self, session: Session, policy: StopPolicy, *, was_enabled: bool) -> None:
-        caps = self._bounds.current or [values["Current Limit"] for values in session.settings]
+        caps = [task.current_cap for task in self._tasks] or [values["Current Limit"] for values in session.settings]
         stop_servos(session, policy, caps, self._last_goals)
 
     def _leave(self, session: Session) -> None:
@@ -149,11 +150,11 @@ class DynamixelArm(SerialServoArm[Session]):
         """Hold an arm that leaves its limits while it is given current: its servos would let it."""
         if self._watch is None or session.health.runaway is not None:
             return
-        session.health.runaway = self._watch.look(reading.position, reading.velocity)
+        session.health.runaway = self._watch.look(reading.state.position, reading.state.velocity)
         if session.health.runaway is None:
             return
         try:
-            stop_servos(session, StopPolicy.HOLD, self._bounds.current, None)
+            stop_servos(session, StopPolicy.HOLD, [task.current_cap for task in self._tasks], None)
         except DriverError as error:
             # A servo that does not answer is told of by its missing samples.
             if error.kind is DriverErrorKind.LOST:
@@ -186,13 +187,4 @@ def _arm_state(session: Session, reading: GroupReading, temperature: Array) -> A
     for joint, alert in enumerate(reading.alerts):
         if alert is not None:
             session.health.alerts[joint] = alert
-    return ArmState(
-        time_ns=reading.time_ns,
-        position=reading.position,
-        velocity=reading.velocity,
-        effort=reading.current,
-        temperature=temperature,
-        enabled=session.enabled,
-        faults=session.health.faults,
-        late_ns=reading.late_ns,
-    )
+    return replace(reading.state, temperature=temperature, enabled=session.enabled, faults=session.health.faults)

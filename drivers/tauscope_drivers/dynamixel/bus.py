@@ -115,7 +115,6 @@ class ServoBus(serial_bus.SerialServoBus[Status]):
 
     def __init__(self, port: SerialPort, clock: Clock | None = None) -> None:
         super().__init__(port, clock)
-        self.discarded_bytes = 0
         self._answered_ns = 0
 
     def ping(self, servo: int) -> tuple[int, int] | None:
@@ -221,7 +220,6 @@ class ServoBus(serial_bus.SerialServoBus[Status]):
                 if not owed:
                     break
                 deadline = min(deadline, time.monotonic_ns() + _AFTERTHOUGHT_NS)
-        self.discarded_bytes += parser.discarded
         self._miss(turns.unheard, length)
         return turns.answers
 
@@ -241,7 +239,6 @@ class ServoBus(serial_bus.SerialServoBus[Status]):
                 if not owed:
                     break
                 deadline = min(deadline, time.monotonic_ns() + _AFTERTHOUGHT_NS)
-        self.discarded_bytes += parser.discarded
         if not packets_found:
             packets_found = [packets.decode_fast(parser.pending, servos, length)]
         answers = {status.servo: status for status in packets_found[0]} if len(packets_found) == 1 else {}
@@ -260,7 +257,6 @@ class ServoBus(serial_bus.SerialServoBus[Status]):
                 status = packets.decode_status(frame)
                 if status is not None and status.servo == servo and (len(status.data) == length or status.refusal):
                     return status
-        self.discarded_bytes += parser.discarded
         self._miss([servo], length)
         return None
 

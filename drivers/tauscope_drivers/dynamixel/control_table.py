@@ -36,7 +36,6 @@ class FamilyFacts:
 
     name: str
     position_mode: int
-    voltage_unit_v: float = 0.1  # of Present Input Voltage [V]
     error_is_code: bool = False
     torque_on_by_goal: bool = False
 
@@ -44,7 +43,7 @@ class FamilyFacts:
 _X = FamilyFacts("X", CURRENT_BASED_POSITION_MODE, torque_on_by_goal=True)
 _MX = FamilyFacts("MX", CURRENT_BASED_POSITION_MODE)
 _P = FamilyFacts("P", POSITION_MODE)
-_Y = FamilyFacts("Y", POSITION_MODE, voltage_unit_v=0.01, error_is_code=True)
+_Y = FamilyFacts("Y", POSITION_MODE, error_is_code=True)
 
 # by the beginnings of the models' names
 _PRO = ("ph", "pm", "h42", "h54", "m42", "m54")
@@ -259,8 +258,8 @@ def find_model(number: int, firmware: int = 0) -> ServoModel:
     items = {item: Item(item, at, size, _SIGNED.fullmatch(item) is not None) for at, size, item in rows}
     for missing, (address, size) in MISSING_ITEMS.get(name, {}).items():
         items.setdefault(missing, Item(missing, address, size, signed=False))
-    shape = {row[0]: float(row[1]) for row in sections["type info"][1:]}
-    units = {row[0]: float(row[1]) for row in sections["unit info"][1:]}
+    shape = {row[0]: float(row[1]) for row in sections.get("type info", [])[1:]}
+    units = {row[0]: float(row[1]) for row in sections.get("unit info", [])[1:]}
     zero, lowest = shape["value_of_zero_radian_position"], shape["value_of_min_radian_position"]
     return ServoModel(
         number=number,
@@ -298,12 +297,8 @@ def _table_text(name: str, firmware: int) -> str:
 
 def _sections(text: str) -> dict[str, list[list[str]]]:
     """Rows of each section of a ``.model`` file, its head line first."""
-    sections: dict[str, list[list[str]]] = {"type info": [], "unit info": [], "control table": []}
-    rows: list[list[str]] = []
-    for line in text.splitlines():
-        stripped = line.strip()
-        if stripped.startswith("["):
-            rows = sections.setdefault(stripped.strip("[]"), [])
-        elif stripped:
-            rows.append([cell.strip() for cell in line.split("\t")])
-    return sections
+    _, *parts = re.split(r"^\s*\[(.+)\]\s*$", text, flags=re.MULTILINE)  # names and contents in turn
+    return {
+        name: [[cell.strip() for cell in line.split("\t")] for line in content.splitlines() if line.strip()]
+        for name, content in zip(parts[::2], parts[1::2], strict=True)
+    }

@@ -11,13 +11,15 @@ from tauscope_drivers.dynamixel import packets, preparation
 from tauscope_drivers.dynamixel.bus import has_room_for_speeds, planned_budget
 from tauscope_drivers.dynamixel.configuration import read_configuration
 from tauscope_drivers.dynamixel.control_table import encode_items
-from tauscope_drivers.dynamixel.enabling import Bounds, goals_of
+from tauscope_drivers.dynamixel.enabling import goals_of
 from tauscope_drivers.dynamixel.group import health_turns, item_writes, paced_goals, servo_families
 from tauscope_drivers.dynamixel.servo import JointServo, make_servo
 from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.inspection import FrameRequest, PlannedFrame
 from tauscope_drivers.limits import require_sensible
 from tauscope_drivers.state import Setpoint
+
+_frame = PlannedFrame.on_serial_bus
 
 # settings of a servo of the X series as delivered, but for a Current Limit that limits nothing
 _DELIVERED = {
@@ -47,6 +49,7 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
             servo.units.velocity_cap(float(limits.velocity[joint])),
             servo.units.counts(float(targets[0, joint])),
             preparation.watchdog_steps(request.watchdog_s),
+            *servo.units.counts_within(float(limits.position_low[joint]), float(limits.position_high[joint])),
         )
         for joint, servo in enumerate(servos)
     ]
@@ -59,9 +62,7 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
         yield from _writes(servo, "enable", preparation.taking_writes(servo, task, holds=False))
     if cycle_s is not None and not has_room_for_speeds(*planned_budget(configuration), cycle_s):
         cycle_s = None
-    ends = zip(servos, limits.position_low.tolist(), limits.position_high.tolist(), strict=True)
-    bounds = Bounds.of(tasks, [servo.units.counts_within(low, high) for servo, low, high in ends])
-    yield from _cycles(servos, mode, bounds, targets, cycle_s)
+    yield from _cycles(servos, tasks, targets, cycle_s)
     for servo in servos:
         items = servo.model.items
         off = [preparation.RegisterWrite(items["Torque Enable"], 0, "torque off")] if mode is ControlMode.TORQUE else []
@@ -71,15 +72,18 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
 
 
 def _cycles(
-    servos: Sequence[JointServo], mode: ControlMode, bounds: Bounds, targets: NDArray[np.float64], cycle_s: float | None
+    servos: Sequence[JointServo],
+    tasks: Sequence[preparation.ServoTask],
+    targets: NDArray[np.float64],
+    cycle_s: float | None,
 ) -> Iterator[PlannedFrame]:
-    turns, pace = health_turns(servos), None
+    mode, turns, pace = tasks[0].mode, health_turns(servos), None
     for cycle, position in enumerate(targets):
-        name, goals = goals_of(servos, mode, bounds, Setpoint(position, np.zeros(len(servos))))
+        name, goals = goals_of(servos, mode, tasks, Setpoint(position, np.zeros(len(servos))))
         if mode is ControlMode.TORQUE or cycle_s is None:
             writes = item_writes(servos, name, goals)
         else:
-            pace = pace or GoalPace(servos, goals, bounds.velocity, cycle_s, 0)
+            pace = pace or GoalPace(servos, goals, [task.velocity_cap for task in tasks], cycle_s, 0)
             writes = paced_goals(servos, goals, pace.speeds(goals, round(cycle * cycle_s * 1e9)))
         for items, values in writes:
             names = ", ".join(item.name for item in items)
@@ -102,7 +106,3 @@ def _writes(servo: JointServo, phase: str, writes: Iterable[preparation.Register
     for write in writes:
         frame = packets.encode_write(servo.servo, write.item.address, write.item.encode(write.value))
         yield _frame(phase, f"{servo.label}: {write.item.name} := {write.value}, {write.reason}", frame)
-
-
-def _frame(phase: str, meaning: str, frame: bytes) -> PlannedFrame:
-    return PlannedFrame(phase, meaning, frame.hex(" ").upper())

@@ -3,7 +3,7 @@
 import contextlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,78 +16,28 @@ from tauscope_drivers.limits import require_sensible
 from tauscope_drivers.state import Setpoint
 
 
-@dataclass(frozen=True)
-class Bounds:
-    """Ranges of the goals, in units of the servos, one a joint. `low`, `high`: of Goal Position [counts]."""
-
-    low: tuple[int, ...]
-    high: tuple[int, ...]
-    current: tuple[int, ...]  # of Goal Current, either sign [units]
-    velocity: tuple[int, ...]  # of Profile Velocity, 0 for none [units]
-
-    @staticmethod
-    def of(tasks: Sequence[preparation.ServoTask], ranges: Sequence[tuple[int, int]]) -> "Bounds":
-        """Bounds of planned tasks. `ranges`: lowest and highest Goal Position of each servo [counts]."""
-        lows, highs = zip(*ranges, strict=True)
-        caps = tuple(task.current_cap for task in tasks)
-        return Bounds(lows, highs, caps, tuple(task.velocity_cap for task in tasks))
-
-
 def goals_of(
-    servos: Sequence[JointServo], mode: ControlMode, bounds: Bounds, setpoint: Setpoint
+    servos: Sequence[JointServo], mode: ControlMode, tasks: Sequence[preparation.ServoTask], setpoint: Setpoint
 ) -> tuple[str, list[int]]:
-    """Item and values of a setpoint. Positions and torques beyond the bounds are brought back to them."""
-    values = (setpoint.position if mode is ControlMode.POSITION else setpoint.torque).tolist()
+    """Item and values of a setpoint. Positions and torques beyond the tasks' bounds are brought back to them."""
     if mode is ControlMode.POSITION:
-        return "Goal Position", [
-            min(max(servo.units.counts(value), low), high)
-            for servo, value, low, high in zip(servos, values, bounds.low, bounds.high, strict=True)
-        ]
-    return "Goal Current", [
-        min(max(servo.units.current_units(value), -cap), cap)
-        for servo, value, cap in zip(servos, values, bounds.current, strict=True)
-    ]
+        pairs = zip(servos, tasks, setpoint.position.tolist(), strict=True)
+        return "Goal Position", [min(max(one.units.counts(q), task.low), task.high) for one, task, q in pairs]
+    pairs = zip(servos, [task.current_cap for task in tasks], setpoint.torque.tolist(), strict=True)
+    return "Goal Current", [min(max(one.units.current_units(torque), -cap), cap) for one, cap, torque in pairs]
 
 
 def enable_servos(
     session: Session, mode: ControlMode, limits: DriveLimits, watchdog_s: float
-) -> tuple[Bounds, list[int]]:
+) -> tuple[list[preparation.ServoTask], list[int]]:
     """Prepare every servo, then give each its place for a goal, its watchdog and torque, one servo at a time.
 
     An arm may fall meanwhile: each servo is asked where it is at the last moment, and catches its joint there. A servo
     that holds its joint already, in the mode that is asked for, is taken over without letting go. Raises DriverError:
-    ``refused`` or ``cannot-connect``: no servo has torque that had none before. Returns the bounds of the cyclic
-    exchange, and the Goal Position that each servo was given where positions are tracked [counts].
+    ``refused`` or ``cannot-connect``: no servo has torque that had none before. Returns the tasks, and the Goal
+    Position that each servo was given where positions are tracked [counts].
     """
-    tasks, ranges = plan_tasks(session, mode, limits, watchdog_s)
-    taken = _give_torque(session, tasks)
-    return Bounds.of(tasks, ranges), taken
-
-
-def plan_tasks(
-    session: Session, mode: ControlMode, limits: DriveLimits, watchdog_s: float
-) -> tuple[list[preparation.ServoTask], list[tuple[int, int]]]:
-    """Check and plan enabling, reading only: a task and the goals' range [counts] a joint. Raises DriverError."""
-    steps = preparation.watchdog_steps(watchdog_s)
-    present = [_present_position(session, joint) for joint in range(len(session.servos))]
-    places = np.array([servo.units.position(count) for servo, count in zip(session.servos, present, strict=True)])
-    require_sensible(limits, places, [servo.label for servo in session.servos])
-    tasks: list[preparation.ServoTask] = []
-    ranges: list[tuple[int, int]] = []
-    for joint, servo in enumerate(session.servos):
-        settings = session.settings[joint]
-        cap = preparation.current_cap(servo, settings, float(limits.torque[joint]))
-        _require_in_own_range(session, joint, mode, present[joint])
-        ranges.append(_range(session, joint, limits, mode))
-        speed = preparation.velocity_cap(servo, settings, float(limits.velocity[joint]))
-        tasks.append(preparation.ServoTask(mode, cap, speed, present[joint], steps))
-        if session.health.has_torque[joint]:
-            _require_adoptable(session, joint, mode)
-    return tasks, ranges
-
-
-def _give_torque(session: Session, tasks: list[preparation.ServoTask]) -> list[int]:
-    """Carry out the tasks; where one fails, those that had no torque before are let go again. The servos' places."""
+    tasks = plan_tasks(session, mode, limits, watchdog_s)
     held_before = session.health.has_torque.copy()
     reached: list[int] = []
     taken: list[int] = []
@@ -105,7 +55,33 @@ def _give_torque(session: Session, tasks: list[preparation.ServoTask]) -> list[i
                     session.write(joint, "Torque Enable", 0)
                 session.write(joint, "Bus Watchdog", 0)
         raise
-    return taken
+    return tasks, taken
+
+
+def plan_tasks(
+    session: Session, mode: ControlMode, limits: DriveLimits, watchdog_s: float
+) -> list[preparation.ServoTask]:
+    """Check and plan enabling, reading only: a task a joint. Raises DriverError."""
+    steps = preparation.watchdog_steps(watchdog_s)
+    present = [_present_position(session, joint) for joint in range(len(session.servos))]
+    places = np.array([servo.units.position(count) for servo, count in zip(session.servos, present, strict=True)])
+    require_sensible(limits, places, [servo.label for servo in session.servos])
+    tasks: list[preparation.ServoTask] = []
+    for joint, servo in enumerate(session.servos):
+        settings = session.settings[joint]
+        cap = preparation.current_cap(servo, settings, float(limits.torque[joint]))
+        _require_in_own_range(session, joint, mode, present[joint])
+        low, high = float(limits.position_low[joint]), float(limits.position_high[joint])
+        lowest, highest = preparation.position_counts(servo, settings, low, high, mode)
+        if lowest >= highest:
+            raise DriverError.refusal(
+                f"{servo.label}: its own Position Limits leave nothing of the range {low:.4g} to {high:.4g}; widen them"
+            )
+        speed = preparation.velocity_cap(servo, settings, float(limits.velocity[joint]))
+        tasks.append(preparation.ServoTask(mode, cap, speed, present[joint], steps, lowest, highest))
+        if session.health.has_torque[joint]:
+            _require_adoptable(session, joint, mode)
+    return tasks
 
 
 def _take(session: Session, joint: int, task: preparation.ServoTask) -> int:
@@ -121,17 +97,6 @@ def _take(session: Session, joint: int, task: preparation.ServoTask) -> int:
 
 def _present_position(session: Session, joint: int) -> int:
     return session.read(joint, ["Present Position"])["Present Position"]
-
-
-def _range(session: Session, joint: int, limits: DriveLimits, mode: ControlMode) -> tuple[int, int]:
-    low, high = float(limits.position_low[joint]), float(limits.position_high[joint])
-    servo = session.servos[joint]
-    lowest, highest = preparation.position_counts(servo, session.settings[joint], low, high, mode)
-    if lowest >= highest:
-        raise DriverError.refusal(
-            f"{servo.label}: its own Position Limits leave nothing of the range {low:.4g} to {high:.4g}; widen them"
-        )
-    return lowest, highest
 
 
 def _require_in_own_range(session: Session, joint: int, mode: ControlMode, present: int) -> None:

@@ -1,7 +1,7 @@
 """The cyclic exchange with all servos: goals by Sync Write, state by (Fast) Sync Read, one servo's health in turn."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from tauscope_drivers.dynamixel.control_table import BYTES_BEFORE_STATE, STATE_I
 from tauscope_drivers.dynamixel.packets import Status
 from tauscope_drivers.dynamixel.servo import JointServo
 from tauscope_drivers.serial_servos.bus import ATTEMPTS, PATIENCE_S, Answers
-from tauscope_drivers.state import Array
+from tauscope_drivers.state import ArmState
 
 PROBES = 3  # how often Fast Sync Read is tried before the firmware counts as not knowing it
 PLAIN_CYCLES = 50  # for how many cycles each servo answers for itself, after a common packet broke off at a silent one
@@ -22,12 +22,8 @@ _CURRENT, _VELOCITY, _POSITION = STATE_ITEMS
 class GroupReading:
     """What the servos measured in one cycle; NaN for who did not answer in it."""
 
-    time_ns: int
-    position: Array  # (n,) [rad or m]
-    velocity: Array  # (n,) [rad/s or m/s]
-    current: Array  # (n,) [mA]
+    state: ArmState  # without temperature, health and faults; effort is current [mA]
     alerts: tuple[bool | None, ...]  # alert bit of each servo; None for who did not answer
-    late_ns: int  # how much later than the bus takes the last answer came [ns]
 
 
 class ServoGroup:
@@ -77,11 +73,10 @@ class ServoGroup:
 
     def read_patiently(self) -> GroupReading:
         """State of all servos, asked for again while one is missing; for use outside the control loop."""
-        reading = self.read(PATIENCE_S)
-        for _ in range(ATTEMPTS - 1):
+        for _ in range(ATTEMPTS):
+            reading = self.read(PATIENCE_S)
             if None not in reading.alerts:
                 break
-            reading = self.read(PATIENCE_S)
         return reading
 
     def read_health(self) -> tuple[int, dict[str, int]]:
@@ -142,7 +137,9 @@ class ServoGroup:
             velocity[index] = servo.units.velocity(values[_VELOCITY])
             current[index] = servo.units.current(values[_CURRENT])
             alerts[index] = status.alert
-        return GroupReading(answers.asked_ns, position, velocity, current, tuple(alerts), answers.late_ns)
+        none = ArmState.unknown(answers.asked_ns, len(self.servos))
+        measured = replace(none, position=position, velocity=velocity, effort=current, late_ns=answers.late_ns)
+        return GroupReading(measured, tuple(alerts))
 
 
 def servo_families(servos: Sequence[JointServo]) -> list[tuple[Block, list[int]]]:
@@ -171,7 +168,6 @@ def paced_goals(
     """Items and values of a cycle's Sync Writes, one a family. `goals`, `speeds`: one a joint [counts], [units]."""
     for _, members in servo_families(servos):
         model = servos[members[0]].model
-        goal, speed = model.items["Goal Position"], model.items["Profile Velocity"]
         speed, goal = model.items["Profile Velocity"], model.items["Goal Position"]
         if speed.address + speed.size == goal.address:  # one write carries both
             yield [speed, goal], {servos[index].servo: [speeds[index], goals[index]] for index in members}

@@ -6,7 +6,7 @@ import numpy as np
 
 from tauscope_drivers.dynamixel.control_table import WATCHDOG_MOST, ServoModel
 from tauscope_drivers.dynamixel.servo import JointServo
-from tauscope_drivers.errors import Fault
+from tauscope_drivers.errors import HOST_REMEDY, Fault, decode_bits
 
 _POWER_CYCLE = "support the arm, switch the servo's power off and on, then acknowledge"
 
@@ -51,19 +51,13 @@ def hardware_faults(model: ServoModel, register: int, joint: int) -> tuple[Fault
             return (watchdog_fault(joint),)
         code, meaning, remedy = _CODES.get(register, ("drive", "fault", "see the servo's manual for the code"))
         return (Fault(code, joint, f"{meaning}, {name} {register}", remedy),)
-    found = tuple(
-        Fault(code, joint, f"{meaning}, {name} 0x{register:02X}", remedy)
-        for bit, code, meaning, remedy in _BITS
-        if register & bit
-    )
-    return found or (Fault("drive", joint, f"{name} 0x{register:02X}", "see the servo's manual for the bits"),)
+    return decode_bits(_BITS, register, joint, name, "see the servo's manual for the bits")
 
 
 def watchdog_fault(joint: int | None) -> Fault:
     """The Bus Watchdog of a servo has fired, or those of all. `joint`: number of the joint, from 1; None for all."""
     who = "the servos" if joint is None else "the servo"
-    detail = f"{who} heard no instruction in time and stopped"
-    return Fault("watchdog", joint, detail, "make sure the host runs, then acknowledge")
+    return Fault("watchdog", joint, f"{who} heard no instruction in time and stopped", HOST_REMEDY)
 
 
 # which error it is was not read yet

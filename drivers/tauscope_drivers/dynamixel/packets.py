@@ -8,6 +8,7 @@ Source: ROBOTIS e-Manual, "Protocol 2.0".
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 from typing_extensions import override
 
@@ -47,18 +48,11 @@ class Status:
         return self.error & ~ALERT & 0xFF
 
 
-def _crc_table() -> tuple[int, ...]:
-    """CRC-16 of the polynomial x¹⁶ + x¹⁵ + x² + 1, most significant bit first, for each byte."""
-    table = []
-    for byte in range(256):
-        crc = byte << 8
-        for _ in range(8):
-            crc = (crc << 1 ^ 0x8005 if crc & 0x8000 else crc << 1) & 0xFFFF
-        table.append(crc)
-    return tuple(table)
-
-
-_CRC = _crc_table()
+# CRC-16 of the polynomial x¹⁶ + x¹⁵ + x² + 1, most significant bit first, for each byte
+_CRC = tuple(
+    reduce(lambda crc, _: (crc << 1 ^ (0x8005 if crc & 0x8000 else 0)) & 0xFFFF, range(8), byte << 8)
+    for byte in range(256)
+)
 
 
 def checksum(data: bytes | bytearray | memoryview, crc: int = 0) -> int:

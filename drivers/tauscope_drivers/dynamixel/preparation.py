@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from tauscope_drivers.backend import ControlMode
 from tauscope_drivers.dynamixel.control_table import CURRENT_MODE, WATCHDOG_MOST, WATCHDOG_STEP_S, Item
-from tauscope_drivers.dynamixel.servo import JointServo
+from tauscope_drivers.dynamixel.servo import MULTI_TURN_COUNTS, JointServo
 from tauscope_drivers.errors import DriverError
 
 # items that are read of each servo when it is reached
@@ -46,6 +46,8 @@ class ServoTask:
     velocity_cap: int  # largest speed of its target while it tracks positions, 0 for none [units]
     present: int  # Present Position [counts]
     watchdog_steps: int
+    low: int = -MULTI_TURN_COUNTS  # of Goal Position [counts]
+    high: int = MULTI_TURN_COUNTS  # likewise
 
 
 def operating_mode(servo: JointServo, mode: ControlMode) -> int:

@@ -127,7 +127,7 @@ def _change_to_holding(session: Session, joints: Sequence[int], caps: Sequence[i
 
 def _present_counts(session: Session, reading: GroupReading) -> list[int | None]:
     return [
-        None if reading.alerts[joint] is None else servo.units.counts(float(reading.position[joint]))
+        None if reading.alerts[joint] is None else servo.units.counts(float(reading.state.position[joint]))
         for joint, servo in enumerate(session.servos)
     ]
 

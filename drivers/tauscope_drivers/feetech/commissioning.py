@@ -87,23 +87,20 @@ def find_flaws(servo: JointServo, reading: Reading, limits: DriveLimits, joint: 
         find(detail, "check the supply, its plug and the cables")
     for fault in alarm_faults(reading.alarms, servo.number):
         find(fault.detail, fault.remedy)
-    return flaws or _find_limits(servo, reading, plan_task(servo, reading, limits, joint))
-
-
-def _find_limits(servo: JointServo, reading: Reading, task: ServoTask) -> list[Finding]:
+    if flaws:
+        return flaws
+    task, present = plan_task(servo, reading, limits, joint), reading.feedback["Present Position"]
+    low, high = settings["Min Position Limit"], settings["Max Position Limit"]
     if not task.torque:
         remedy = "raise limits.torque, or state joints[].torque_constant as Nm for 1 ‰ of load"
-        return [Finding(Severity.FAILURE, servo.label, "the torque limit is below 1 ‰ of its duty", remedy)]
-    if task.low >= task.high:
+        find("the torque limit is below 1 ‰ of its duty", remedy)
+    elif task.low >= task.high:
         remedy = "correct limits.position, drive.zero_count or the servo's own limits"
-        detail = "its own Position Limits leave nothing of the joint's range"
-        return [Finding(Severity.FAILURE, servo.label, detail, remedy)]
-    present, settings = reading.feedback["Present Position"], reading.settings
-    low, high = settings["Min Position Limit"], settings["Max Position Limit"]
-    if not low <= present <= high:
+        find("its own Position Limits leave nothing of the joint's range", remedy)
+    elif not low <= present <= high:
         detail = f"stands at count {present}, its own Position Limits are {low} to {high}"
-        return [Finding(Severity.FAILURE, servo.label, detail, f"move it back by hand, or widen them {_TOOL}")]
-    return []
+        find(detail, f"move it back by hand, or widen them {_TOOL}")
+    return flaws
 
 
 def rehearse(servo: JointServo, reading: Reading, limits: DriveLimits) -> list[Finding]:
@@ -121,14 +118,9 @@ def find_doubts(servo: JointServo, reading: Reading, limits: DriveLimits, target
     gains = ", ".join(f"{name} {settings[f'{name} Coefficient']}" for name in "PDI")
     volts = reading.feedback["Present Voltage"] * registers.VOLT
     dead = max(settings["CW Dead Zone"], settings["CCW Dead Zone"])
-    found = [
-        Finding(
-            Severity.GOOD,
-            servo.label,
-            f"STS3215, firmware {settings['Firmware Major Version']}.{settings['Firmware Minor Version']}, {gains}, "
-            f"dead zone {dead} counts, {volts:.1f} V",
-        )
-    ]
+    firmware = registers.describe_firmware(settings)
+    detail = f"STS3215, firmware {firmware}, {gains}, dead zone {dead} counts, {volts:.1f} V"
+    found = [Finding(Severity.GOOD, servo.label, detail)]
 
     def find(detail: str, remedy: str) -> None:
         found.append(Finding(Severity.WARNING, servo.label, detail, remedy))

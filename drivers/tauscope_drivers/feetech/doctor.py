@@ -8,7 +8,7 @@ from tauscope_drivers.errors import DriverError
 from tauscope_drivers.feetech.bus import FeetechBus, count_traffic
 from tauscope_drivers.feetech.commissioning import find_doubts, read_servo, rehearse
 from tauscope_drivers.feetech.configuration import ServoConfiguration, read_configuration
-from tauscope_drivers.feetech.registers import FEEDBACK, IDENTITY, describe_device
+from tauscope_drivers.feetech.registers import FEEDBACK, IDENTITY, describe_device, describe_firmware
 from tauscope_drivers.feetech.servo import JointServo
 from tauscope_drivers.feetech.session import make_session, reach
 from tauscope_drivers.inspection import Finding, failure
@@ -44,14 +44,7 @@ def _examine_servos(
 
 def _list_servos(bus: FeetechBus) -> list[tuple[int, str, str]]:
     found = [(servo, bus.read(servo, IDENTITY)[1]) for servo in bus.ping_all()]
-    return [
-        (
-            servo,
-            describe_device(servo, identity),
-            f"{identity['Firmware Major Version']}.{identity['Firmware Minor Version']}",
-        )
-        for servo, identity in found
-    ]
+    return [(servo, describe_device(servo, identity), describe_firmware(identity)) for servo, identity in found]
 
 
 examine = partial(examine_bus, read_configuration, FeetechBus, _examine_servos)

@@ -16,6 +16,8 @@ from tauscope_drivers.goal_pace import GoalPace
 from tauscope_drivers.inspection import FrameRequest, PlannedFrame
 from tauscope_drivers.limits import require_sensible
 
+_frame = PlannedFrame.on_serial_bus
+
 # a servo as delivered, at 7.4 V
 _DELIVERED = Reading(
     {"Min Position Limit": 0, "Max Position Limit": COUNTS_PER_TURN - 1, "Max Torque Limit": PERMILLE},
@@ -85,7 +87,3 @@ def _read(servo: JointServo, phase: str, block: Block, meaning: str) -> PlannedF
 def _write(servo: JointServo, values: Mapping[str, int]) -> PlannedFrame:
     told = ", ".join(f"{name} := {value}" for name, value in values.items())
     return _frame("enable", f"{servo.label}: {told}", packets.encode_write(servo.servo, *encode_registers(values)))
-
-
-def _frame(phase: str, meaning: str, frame: bytes) -> PlannedFrame:
-    return PlannedFrame(phase, meaning, frame.hex(" ").upper())

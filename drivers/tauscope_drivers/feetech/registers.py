@@ -157,6 +157,11 @@ def describe_device(servo: int, identity: Mapping[str, int]) -> str:
     return f"model number {number} (not supported)"
 
 
+def describe_firmware(identity: Mapping[str, int]) -> str:
+    """Version of its firmware. `identity`: the registers of `IDENTITY`."""
+    return f"{identity['Firmware Major Version']}.{identity['Firmware Minor Version']}"
+
+
 def _model_number(identity: Mapping[str, int]) -> int:
     """Model number; servos of the SCS series have the high byte first, and say so."""
     number = identity["Model Number"]

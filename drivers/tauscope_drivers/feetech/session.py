@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tauscope_drivers.errors import DriverError, DriverErrorKind, Fault
+from tauscope_drivers.errors import HOST_REMEDY, DriverError, DriverErrorKind, Fault, decode_bits
 from tauscope_drivers.feetech import registers
 from tauscope_drivers.feetech.bus import FeetechBus
 from tauscope_drivers.feetech.configuration import ServoConfiguration
@@ -15,8 +15,7 @@ from tauscope_drivers.serial_servos.bus import PATIENCE_S, RETURN_DELAY_UNIT_S, 
 
 _PROBES = 3  # answers by which the latency of an adapter is learnt
 
-_SILENCE = "no goal was sent in time; the servos hold their last one"
-_WATCHDOG = Fault("watchdog", None, _SILENCE, "make sure the host runs, then acknowledge")
+_WATCHDOG = Fault("watchdog", None, "no goal was sent in time; the servos hold their last one", HOST_REMEDY)
 _RESTARTED = (
     "the servo has lost its torque or its limits; it lost power or was restarted",
     "check supply and cable, then acknowledge and enable again",
@@ -35,14 +34,7 @@ _BITS: tuple[tuple[int, str, str, str], ...] = (
 
 def alarm_faults(alarms: int, joint: int) -> tuple[Fault, ...]:
     """Faults that alarms state; empty for 0. `alarms`: the register Status, as every answer has it; `joint`: from 1."""
-    found = tuple(
-        Fault(code, joint, f"{meaning}, Status 0x{alarms:02X}", remedy)
-        for bit, code, meaning, remedy in _BITS
-        if alarms & bit
-    )
-    if found or not alarms:
-        return found
-    return (Fault("drive", joint, f"Status 0x{alarms:02X}", "see the servo's memory table for the bits"),)
+    return decode_bits(_BITS, alarms, joint, "Status", "see the servo's memory table for the bits")
 
 
 class Health:

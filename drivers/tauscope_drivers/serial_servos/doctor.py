@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from typing import Any, TypeVar
 
 from tauscope_drivers.drive_block import DriveJoint
@@ -34,16 +35,14 @@ def examine_bus(
 ) -> list[Finding]:
     """Port, adapter, and every servo of the robot file. Raises DriverError ``refused``: an invalid block."""
     configuration = read_configuration(joints)
-    port = SerialPort(configuration.port, configuration.baud, slack_s)
     try:
-        port.open()
-        findings = [Finding(Severity.GOOD, port.path, f"open at {port.baudrate} baud, locked for this program")]
-        findings.append(latency_finding(port.path))
-        return findings + examine_servos(make_bus(port), configuration.servos, joints)
+        with closing(SerialPort(configuration.port, configuration.baud, slack_s)) as port:
+            port.open()
+            opened = Finding(Severity.GOOD, port.path, f"open at {port.baudrate} baud, locked for this program")
+            found = examine_servos(make_bus(port), configuration.servos, joints)
+            return [opened, latency_finding(port.path), *found]
     except DriverError as error:
         return [failure(configuration.port, str(error))]
-    finally:
-        port.close()
 
 
 def measure_loop_rate(
@@ -74,11 +73,8 @@ def scan_bauds(
 ) -> Iterator[FoundDevice]:
     """Who answers a ping to all at each of `bauds`, or the `usual` ones. Raises DriverError ``cannot-connect``."""
     for baud in bauds or usual:
-        port = SerialPort(path, baud, slack_s)
-        port.open()
-        try:
+        with closing(SerialPort(path, baud, slack_s)) as port:
+            port.open()
             found = list_servos(make_bus(port))
-        finally:
-            port.close()
         for servo, model, firmware in found:
             yield FoundDevice(servo, baud, model, firmware)

@@ -1,6 +1,6 @@
 """One emulated CiA 402 drive: objects, power state, modes, heartbeats. Time and frames go in, frames come out."""
 
-from collections.abc import Callable
+from collections.abc import Container
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
@@ -29,15 +29,6 @@ class AxisDemand:
     torque: float = 0.0  # target where the mode is torque [Nm or N]
     torque_cap: float = 0.0  # most that it exerts; nothing where it is released [Nm or N]
     interpolation_s: float = 0.0
-
-
-@dataclass(frozen=True)
-class AxisMeasurement:
-    """What a drive's sensors tell of its joint."""
-
-    position: float  # [rad or m]
-    velocity: float  # [rad/s or m/s]
-    torque: float  # [Nm or N]
 
 
 @dataclass(frozen=True)
@@ -71,7 +62,7 @@ _NMT_RESETS = (0x81, 0x82)
 _QUICK_STOP_STAYS = range(5, 9)
 _STANDING = 1e-3
 _INTERPOLATE = 0x10
-_EXPONENTS = range(-6, 1)
+_PERIODS, _EXPONENTS = range(1, 256), range(-6, 1)  # values of 0x60C2 that are taken
 
 
 class EmulatedDrive:
@@ -151,13 +142,13 @@ class EmulatedDrive:
             return AxisDemand(AxisMode.TORQUE, torque=min(max(torque, -cap), cap), torque_cap=cap)
         return AxisDemand(AxisMode.HOLDING, torque_cap=cap)
 
-    def measure(self, measurement: AxisMeasurement) -> None:
-        """Let the sensors see the joint."""
+    def measure(self, position: float, velocity: float, torque: float) -> None:
+        """Let the sensors see the joint. [rad or m], [rad/s or m/s], [Nm or N]."""
         put, scale = self.dictionary.put, self.scale
-        put(0x6064, round(measurement.position * scale.counts_per_radian))
-        put(0x606C, round(measurement.velocity * scale.counts_per_radian))
-        put(0x6077, round(measurement.torque / scale.torque_per_permille))
-        if abs(measurement.velocity) < _STANDING:
+        put(0x6064, round(position * scale.counts_per_radian))
+        put(0x606C, round(velocity * scale.counts_per_radian))
+        put(0x6077, round(torque / scale.torque_per_permille))
+        if abs(velocity) < _STANDING:
             self.power.end_quick_stop()
         self._show_status()
 
@@ -259,7 +250,7 @@ class EmulatedDrive:
         """Entries at power-up; the target position is stale on purpose, as it is on a real drive after a run."""
         dictionary = object_dictionary.ObjectDictionary()
         for index, subindex, size, value, signed, writable in _ENTRIES:
-            dictionary.add(index, subindex, size, value, signed=signed, writable=writable)
+            dictionary.entries[index, subindex] = object_dictionary.Entry(size, value, signed, writable)
         for (index, subindex), hook in self._hooks().items():
             dictionary.entries[index, subindex].hook = hook
         dictionary.put(0x6076, self.scale.rated_torque_mnm)
@@ -278,13 +269,13 @@ class EmulatedDrive:
             (0x6040, 0): self._take_controlword,
             (0x605A, 0): take_option,
             (0x6060, 0): self._take_mode,
-            (0x60C2, 1): partial(_require, lambda value: value != 0),
-            (0x60C2, 2): partial(_require, lambda exponent: exponent in _EXPONENTS),
+            (0x60C2, 1): partial(_require, _PERIODS),
+            (0x60C2, 2): partial(_require, _EXPONENTS),
         }
 
 
-def _require(is_taken: Callable[[int], bool], value: int) -> None:
-    if not is_taken(value):
+def _require(taken: Container[int], value: int) -> None:
+    if value not in taken:
         raise object_dictionary.AbortError(object_dictionary.Abort.VALUE_RANGE)
 
 

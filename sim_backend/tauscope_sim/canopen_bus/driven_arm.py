@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from tauscope.robot import Robot
 from tauscope.robot.robot import Array
-from tauscope_sim.canopen_bus.drive import AxisDemand, AxisMeasurement, AxisMode, EmulatedDrive
+from tauscope_sim.canopen_bus.drive import AxisDemand, AxisMode, EmulatedDrive
 from tauscope_sim.device.servo import InertiaSchedule, Servo
 from tauscope_sim.device.target import Target, catching_up_acceleration
 from tauscope_sim.scenario import Scenario
@@ -96,8 +96,8 @@ class DrivenArm:
         torque = np.clip(torque, np.minimum(at_tick, self.torque), np.maximum(at_tick, self.torque))
         torque = torque + self._torque_noise * self._rng.standard_normal(len(self._drives))
         seen = zip(position + self.encoder_offset, velocity, torque, strict=True)
-        for drive, (q, v, tau) in zip(self._drives, seen, strict=True):
-            drive.measure(AxisMeasurement(float(q), float(v), float(tau)))
+        for drive, values in zip(self._drives, seen, strict=True):
+            drive.measure(*map(float, values))
 
     def _demands(self) -> list[AxisDemand]:
         """What the drives demand now; targets begin anew where a drive does something else than before."""
@@ -120,15 +120,11 @@ class DrivenArm:
         for kind in dict.fromkeys(kinds):
             if kind[0] in TRACKING:
                 joints = [joint for joint, other in enumerate(kinds) if other == kind]
-                self._targets[kind] = joints, self._target(joints, kind)
-
-    def _target(self, joints: list[int], kind: Kind) -> Target:
-        period = kind[1] / self._period_s or None
-        goal, rate, acceleration = self._goal[joints], self._goal_rate[joints], self._acceleration[joints]
-        target = Target(goal, rate, acceleration, self._period_s, period)
-        unlimited = np.full(len(joints), np.inf)
-        target.limit(-unlimited, unlimited, self._fastest[joints])
-        return target
+                goal, rate, acceleration = self._goal[joints], self._goal_rate[joints], self._acceleration[joints]
+                target = Target(goal, rate, acceleration, self._period_s, kind[1] / self._period_s or None)
+                unlimited = np.full(len(joints), np.inf)
+                target.limit(-unlimited, unlimited, self._fastest[joints])
+                self._targets[kind] = joints, target
 
     def _torque_of(self, demands: Sequence[AxisDemand]) -> Array:
         """Torque of the position loops where a target is tracked, else what is demanded."""

@@ -25,18 +25,19 @@ _OVER_TEMPERATURE, _OVERLOAD = 0x4310, 0x7121
 class CanEmulator(Emulator):
     """An arm of emulated drives; the instants are those of the caller's clock."""
 
+    arm: DrivenArm
+
     def __init__(
         self,
         drives: Sequence[EmulatedDrive],
-        driven: DrivenArm,
+        arm: DrivenArm,
         now_s: float,
         bit_rate: float,
         line: SerialLine | SocketLine,
     ) -> None:
         """Everything at rest. `bit_rate`: of the bus; infinite where frames shall arrive at once [bit/s]."""
-        super().__init__(now_s)
+        super().__init__(arm, now_s)
         self.drives = tuple(drives)
-        self.driven = driven
         self._wire = Wire(bit_rate)
         self._line = line
         self._answers = b""
@@ -61,18 +62,18 @@ class CanEmulator(Emulator):
         """
         frames, answers = self._line.take(data)
         self._answers += answers
-        self.driven.measure()
+        self.arm.measure()
         for frame in frames:
             self._wire.occupy(frame, now_s)
             if frame[0] == _SYNC:
                 self.advance_to(now_s)
-                self.driven.measure(min(1.0, max(0.0, (now_s - self.now_s) / STEP_S)))
+                self.arm.measure(min(1.0, max(0.0, (now_s - self.now_s) / STEP_S)))
             come_s = self.now_s
             for drive in self.drives:
                 if self._is_there(drive, come_s):
                     self._wire.carry(drive.receive(frame, come_s), now_s)
             if frame[0] == _SYNC:
-                self.driven.take_targets(now_s - self._clock.lost_s)
+                self.arm.take_targets(now_s - self._clock.lost_s)
         self.advance_to(now_s)
 
     def due(self, now_s: float) -> bytes:
@@ -82,17 +83,11 @@ class CanEmulator(Emulator):
 
     def describe(self) -> dict[str, Any]:
         """Where the arm is and what its drives do."""
-        position, velocity = self.driven.motion
-        return {
-            "time": self.now_s,
-            "position": position.tolist(),
-            "velocity": velocity.tolist(),
-            "torque": self.driven.torque.tolist(),
+        return super().describe() | {
+            "torque": self.arm.torque.tolist(),
             "state": [drive.power.state.name for drive in self.drives],
             "commanded": [drive.power.state is PowerState.OPERATION_ENABLED for drive in self.drives],
             "stopped_at": self._stopped_s,
-            "on_stand": self.driven.stands_on_stand,
-            "lost": self._clock.lost_s,
         }
 
     def inject(self, faults: list[InjectedFault]) -> None:
@@ -109,16 +104,12 @@ class CanEmulator(Emulator):
         """Set an entry."""
         self._drive(device).dictionary.put(place[0], value, place[1])
 
-    def set_stand(self, is_there: bool) -> None:
-        """Put the stand under the arm, or take it away."""
-        self.driven.stands_on_stand = is_there
-
     def _step(self) -> None:
         now_s = self.now_s
         self._run_faults()
-        self.driven.step(self._clock.tick)
+        self.arm.step(self._clock.tick)
         if self._clock.tick % _TICKS_PER_MEASUREMENT == 0:
-            self.driven.measure()
+            self.arm.measure()
         for place, drive in enumerate(self.drives):
             was_enabled = drive.power.state is PowerState.OPERATION_ENABLED
             self._let_ail(drive)
@@ -133,28 +124,24 @@ class CanEmulator(Emulator):
 
     def _carry_out(self, fault: InjectedFault) -> None:
         until_s = self.now_s + fault.seconds
-        concerned = [self._drive(fault.device)] if fault.device else list(self.drives)
-        match fault.kind:
-            case FaultKind.SILENT:
-                for drive in concerned:
+        is_everywhere = fault.kind is FaultKind.POWER_DIP or not fault.device
+        for drive in self.drives if is_everywhere else [self._drive(fault.device)]:
+            match fault.kind:
+                case FaultKind.SILENT:
                     self._away_until_s[drive.node_id] = until_s
-            case FaultKind.BUS_OFF:
-                for drive in concerned:
+                case FaultKind.BUS_OFF:
                     drive.leave_bus()
                     self._away_until_s[drive.node_id] = until_s
-            case FaultKind.RESET | FaultKind.POWER_DIP:
-                for drive in self.drives if fault.kind is FaultKind.POWER_DIP else concerned:
+                case FaultKind.RESET | FaultKind.POWER_DIP:
                     drive.power_up()
                     self._away_until_s[drive.node_id] = until_s
-            case FaultKind.OVER_TEMPERATURE | FaultKind.OVERLOAD:
-                code = _OVERLOAD if fault.kind is FaultKind.OVERLOAD else _OVER_TEMPERATURE
-                self._ailing |= {drive.node_id: (code, until_s) for drive in concerned}
-            case FaultKind.ENCODER_JUMP:
-                for drive in concerned:
-                    joint = self.drives.index(drive)
-                    self.driven.encoder_offset[joint] += fault.counts / drive.scale.counts_per_radian
-            case _:
-                for drive in concerned:
+                case FaultKind.OVER_TEMPERATURE | FaultKind.OVERLOAD:
+                    code = _OVERLOAD if fault.kind is FaultKind.OVERLOAD else _OVER_TEMPERATURE
+                    self._ailing[drive.node_id] = code, until_s
+                case FaultKind.ENCODER_JUMP:
+                    slip = fault.counts / drive.scale.counts_per_radian
+                    self.arm.encoder_offset[self.drives.index(drive)] += slip
+                case _:
                     self._wire.faults[drive.node_id] = AnswerFaults(fault.kind, fault.count, fault.seconds)
 
     def _let_ail(self, drive: EmulatedDrive) -> None:

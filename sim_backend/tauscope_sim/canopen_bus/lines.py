@@ -12,6 +12,7 @@ _END, _ERROR = b"\r", b"\a"
 _STANDARD, _EXTENDED, _REMOTE, _EXTENDED_REMOTE = b"t", b"T", b"r", b"R"
 _IDENTIFIER_DIGITS = {_STANDARD: 3, _EXTENDED: 8, _REMOTE: 3, _EXTENDED_REMOTE: 8}
 _LONGEST_LINE = 32
+_REPLIES = {**dict.fromkeys((b"S", b"s", b"Y", b"Z", b""), b""), b"V": b"V1013", b"N": b"NTAUS"}
 
 
 class SerialLine:
@@ -45,12 +46,8 @@ class SerialLine:
         if command in (b"O", b"L", b"C"):
             self.is_open = command != b"C"
             return _END
-        if command in (b"S", b"s", b"Y", b"Z", b""):
-            return _END
-        if command == b"V":
-            return b"V1013" + _END
-        if command == b"N":
-            return b"NTAUS" + _END
+        if command in _REPLIES:
+            return _REPLIES[command] + _END
         if command in _IDENTIFIER_DIGITS and self.is_open:
             frame = _frame(line)
             if frame is None:
@@ -64,14 +61,13 @@ class SerialLine:
 
 
 def _frame(line: bytes) -> Frame | None:
-    digits = _IDENTIFIER_DIGITS[line[:1]]
+    digits, is_remote = _IDENTIFIER_DIGITS[line[:1]], line[:1] in (_REMOTE, _EXTENDED_REMOTE)
     try:
         identifier, length = int(line[1 : 1 + digits], 16), int(line[1 + digits : 2 + digits])
-        payload = b"" if line[:1] in (_REMOTE, _EXTENDED_REMOTE) else binascii.unhexlify(line[2 + digits :])
+        payload = b"" if is_remote else binascii.unhexlify(line[2 + digits :])
     except ValueError:
         return None
-    sent = length if line[:1] in (_REMOTE, _EXTENDED_REMOTE) else len(payload)
-    return (identifier, payload) if sent == length <= 8 else None
+    return (identifier, payload) if (is_remote or len(payload) == length) and length <= 8 else None
 
 
 _FRAME = struct.Struct("=IB3x8s")  # the kernel's ``struct can_frame``: identifier with flags, length, padding, data

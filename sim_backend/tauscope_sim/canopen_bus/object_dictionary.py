@@ -12,7 +12,6 @@ class Abort(IntEnum):
     """Abort codes of SDO transfers, CiA 301."""
 
     UNKNOWN_COMMAND = 0x05040001
-    WRITE_ONLY = 0x06010001
     READ_ONLY = 0x06010002
     NO_OBJECT = 0x06020000
     NOT_MAPPABLE = 0x06040041
@@ -39,7 +38,7 @@ WriteHook = Callable[[int], None]
 class Entry:
     """One entry; one that is not visible is the drive's own, as if a master had never heard of it."""
 
-    bytes: int
+    bytes: int  # 1, 2 or 4
     value: int = 0
     signed: bool = False
     writable: bool = True
@@ -52,21 +51,6 @@ class ObjectDictionary:
     """All entries, by index and subindex."""
 
     entries: dict[tuple[int, int], Entry] = field(default_factory=dict)  # of (index, subindex) to Entry
-
-    def add(
-        self,
-        index: int,
-        subindex: int,
-        size: int,
-        value: int = 0,
-        *,
-        signed: bool = False,
-        writable: bool = True,
-        hook: WriteHook | None = None,
-    ) -> Entry:
-        """Add an entry. `size`: 1, 2 or 4 [bytes]."""
-        entry = self.entries[index, subindex] = Entry(size, value, signed, writable, hook)
-        return entry
 
     def get(self, index: int, subindex: int = 0) -> int:
         """Value of an entry."""
@@ -151,7 +135,7 @@ def apply_sheet(dictionary: ObjectDictionary, file: DeviceFile) -> None:
         if not size:
             continue
         is_own = (index, subindex) in dictionary.entries
-        entry = dictionary.entries[index, subindex] if is_own else dictionary.add(index, subindex, size)
+        entry = dictionary.entries.setdefault((index, subindex), Entry(size))
         entry.bytes, entry.signed, entry.writable = size, signed, "w" in described.access
         data = described.value
         value = described.default if data is None else int.from_bytes(data, "little", signed=signed)
@@ -193,25 +177,24 @@ class ProcessData:
         self._sent = [self._add(0x1800 + number, 0x180 + 0x100 * number + node_id) for number in range(PDOS)]
 
     def _add(self, communication: int, identifier: int) -> _Pdo:
-        add, mapping = self._dictionary.add, communication + _TO_MAPPING
-        add(communication, 0, 1, 2, writable=False)
-        cob_id = add(communication, 1, 4, _OFF | identifier)
-        transmission = add(communication, 2, 1, 255)
-        add(mapping, 0, 1, hook=partial(self._require_fit, mapping))
+        entries, mapping = self._dictionary.entries, communication + _TO_MAPPING
+        entries[communication, 0] = Entry(1, 2, writable=False)
+        entries[communication, 1] = cob_id = Entry(4, _OFF | identifier)
+        entries[communication, 2] = transmission = Entry(1, 255)
+        entries[mapping, 0] = Entry(1, hook=partial(self._require_fit, mapping))
         for subindex in range(1, ENTRIES + 1):
-            add(mapping, subindex, 4, hook=partial(self._require_mappable, mapping))
+            entries[mapping, subindex] = Entry(4, hook=partial(self._require_mappable, mapping))
         return _Pdo(cob_id, transmission, mapping)
 
-    def take(self, identifier: int, payload: bytes) -> bool:
-        """Keep a frame for the next SYNC; False where it is no RPDO of this node."""
+    def take(self, identifier: int, payload: bytes) -> None:
+        """Keep a frame for the next SYNC where it is an RPDO of this node."""
         for number, pdo in enumerate(self._received):
             if pdo.identifier == identifier:
                 if pdo.transmission.value <= _HIGHEST_SYNCHRONOUS:
                     self._waiting[number] = payload
                 else:
                     self._apply(pdo, payload)
-                return True
-        return False
+                return
 
     def synchronise(self) -> list[tuple[int, bytes]]:
         """Apply what waited, and sample the frames that this SYNC asks for: identifiers and payloads."""
@@ -227,7 +210,7 @@ class ProcessData:
         return frames
 
     def _entries(self, mapping: int) -> list[tuple[int, int, int]]:
-        words = self._words(mapping, self._dictionary.get(mapping, 0))
+        words = self._words(mapping, self._dictionary.get(mapping))
         return [(word >> 16, word >> 8 & 0xFF, (word & 0xFF) // 8) for word in words]
 
     def _words(self, mapping: int, count: int) -> list[int]:

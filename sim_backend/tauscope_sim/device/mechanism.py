@@ -1,7 +1,5 @@
 """The arm behind the drives, moved tick by tick, and the state at each tick that readings are taken from."""
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -37,15 +35,6 @@ def _inertia(bodies: RigidBodies, posture: Array) -> Array:
 
 # bandwidth of the drives' velocity estimate: turns the encoder's error into that of the velocity [rad/s]
 VELOCITY_BANDWIDTH = 2.0 * np.pi * 20.0
-
-
-class Sample(NamedTuple):
-    """The true state of the motors, in joint units, that one reading is taken from; (n,) each."""
-
-    time_s: float
-    position: Array
-    velocity: Array
-    torque: Array
 
 
 class Mechanism:
@@ -109,5 +98,6 @@ class Mechanism:
         self._take(self._zero, tick)
 
     def _take(self, torque: Array, tick: int) -> None:
-        self._sample = Sample(tick * self._tick_s, self.true.motor_position, self.true.motor_velocity, torque)
+        """Keep what the next reading is taken from: instant [s], position, velocity and torque of the motors."""
+        self._sample = tick * self._tick_s, self.true.motor_position, self.true.motor_velocity, torque
         self._reading = None

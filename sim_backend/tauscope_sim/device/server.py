@@ -1,5 +1,6 @@
 """The device process: keeps the simulated drives in step with the machine's clock, and serves one host at a time."""
 
+import contextlib
 import os
 import select
 import socket
@@ -64,8 +65,8 @@ class _Host:
         connection.setblocking(False)
         self.connection = connection
         self.buffer = messages.FrameBuffer()
-        self.process: int  # at the other end, as the kernel knows it
-        self.process, _, _ = _PEER.unpack(connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size))
+        peer = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size)
+        self.process: int = _PEER.unpack(peer)[0]  # at the other end, as the kernel knows it
 
     def send(self, frame: messages.Frame) -> None:
         """Send a reply whole, or give the connection up: a host that reads nothing must not block the device."""
@@ -166,12 +167,9 @@ class DeviceServer:
         held = DriverError.no_connection(
             f"the simulated arm is held by process {self._host.process}; end that run first"
         )
-        with connection:
+        with connection, contextlib.suppress(OSError):
             connection.setblocking(False)
-            try:
-                connection.send(messages.Frame(messages.FrameKind.ERROR, 0, messages.encode_error(held)).encode())
-            except OSError:
-                return
+            connection.send(messages.Frame(messages.FrameKind.ERROR, 0, messages.encode_error(held)).encode())
 
     def _drop_host(self, reason: str) -> None:
         """Close the connection; an arm under this host's command stops as if its watchdog had fired."""

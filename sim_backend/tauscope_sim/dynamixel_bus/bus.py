@@ -2,10 +2,12 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from typing import Any
 
 from dynamixel_sdk import Protocol2PacketHandler
+from typing_extensions import override
 
+from tauscope_drivers.serial_servos.bus import FrameParser
 from tauscope_sim.dynamixel_bus.control_memory import WriteRefusedError
 from tauscope_sim.dynamixel_bus.servo import EmulatedServo
 from tauscope_sim.emulation.fault_kit import AnswerFaults, FaultKind, InjectedFault
@@ -13,7 +15,6 @@ from tauscope_sim.emulation.fault_kit import AnswerFaults, FaultKind, InjectedFa
 BROADCAST_ID = 0xFE
 _HEADER = b"\xff\xff\xfd\x00"
 _STATUS = 0x55
-_LONGEST = 1024
 _library = Protocol2PacketHandler()
 
 
@@ -46,49 +47,25 @@ def fast_status_frame(answers: list[tuple[int, int, bytes]], servos: int, length
     return bytes(frame)
 
 
-class InstructionParser:
-    """Finds instructions in what a master sends; answers of other servos are passed over."""
+class InstructionParser(FrameParser):
+    """Finds whole frames in what a master sends; lengths and checksums are the library's, not the driver's."""
 
-    def __init__(self) -> None:
-        self._buffer = bytearray()
+    header, fixed_bytes, longest = _HEADER, 7, 1024
 
-    def feed(self, received: bytes) -> list[Instruction]:
-        """Instructions that are complete now."""
-        self._buffer += received
-        found: list[Instruction] = []
-        while True:
-            start = self._buffer.find(_HEADER)
-            if start < 0:
-                del self._buffer[: max(0, len(self._buffer) - 3)]
-                return found
-            del self._buffer[:start]
-            if len(self._buffer) < 7:
-                return found
-            length = int.from_bytes(self._buffer[5:7], "little")
-            end = 7 + length
-            if length < 3 or end > _LONGEST:
-                del self._buffer[0]
-            elif len(self._buffer) < end:
-                return found
-            elif _library.updateCRC(0, self._buffer, end - 2) != int.from_bytes(self._buffer[end - 2 : end], "little"):
-                del self._buffer[0]
-            else:
-                frame = list(self._buffer[:end])
-                del self._buffer[:end]
-                if frame[7] != _STATUS:
-                    body = _remove_stuffing(frame[7:-2])
-                    found.append(Instruction(frame[4], body[0], bytes(body[1:]), len(frame)))
+    @override
+    def find_end(self, start: bytearray) -> int | None:
+        length = int.from_bytes(start[5:7], "little")
+        return 7 + length if length >= 3 else None
+
+    @override
+    def is_whole(self, frame: bytes) -> bool:
+        return _library.updateCRC(0, frame, len(frame) - 2) == int.from_bytes(frame[-2:], "little")
 
 
-def _remove_stuffing(stuffed: list[int]) -> list[int]:
-    """Byte by byte: FD after FF FF FD is left out."""
-    plain: list[int] = []
-    skipped = False
-    for byte in stuffed:
-        skipped = byte == 0xFD and not skipped and plain[-3:] == [0xFF, 0xFF, 0xFD]
-        if not skipped:
-            plain.append(byte)
-    return plain
+def decode_instruction(frame: bytes) -> Instruction:
+    """What a frame asks."""
+    body = frame[7:-2].replace(b"\xff\xff\xfd\xfd", b"\xff\xff\xfd")
+    return Instruction(frame[4], body[0], body[1:], len(frame))
 
 
 Delivery = tuple[float, bytes]  # when bytes arrive at the master [s], and which
@@ -118,11 +95,9 @@ class EmulatedBus:
             READ: self._read,
             WRITE: self._write,
             REG_WRITE: self._write,
-            ACTION: lambda instruction, end_s: self._confirm(instruction, end_s, lambda servo: _attempt(servo.act)),
+            ACTION: lambda asked, end_s: self._confirm(asked, end_s, lambda servo: _attempt(servo.act)),
             REBOOT: self._reboot,
-            CLEAR: lambda instruction, end_s: self._confirm(
-                instruction, end_s, lambda servo: _attempt(partial(servo.clear, instruction.parameters))
-            ),
+            CLEAR: lambda asked, end_s: self._confirm(asked, end_s, lambda one: _attempt(one.clear, asked.parameters)),
             SYNC_READ: self._sync_read,
             SYNC_WRITE: self._sync_write,
             BULK_READ: self._bulk_read,
@@ -133,7 +108,7 @@ class EmulatedBus:
 
     def hear(self, data: bytes, now_s: float) -> list[Instruction]:
         """Instructions in the bytes of a master; every servo that is there hears them, which contents its watchdog."""
-        instructions = self._parser.feed(data)
+        instructions = [decode_instruction(frame) for frame in self._parser.feed(data) if frame[7] != _STATUS]
         if instructions:
             for servo in self._present(now_s):
                 servo.hear(now_s)
@@ -212,9 +187,8 @@ class EmulatedBus:
     def _read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
         if instruction.servo == BROADCAST_ID or len(instruction.parameters) != 4:
             return []
-        servos = [
-            servo for servo in self._find_addressed(instruction, end_s) if servo.memory.get("Status Return Level")
-        ]
+        addressed = self._find_addressed(instruction, end_s)
+        servos = [servo for servo in addressed if servo.memory.get("Status Return Level")]
         return self._answers([self._value(servo, *_words(instruction.parameters)) for servo in servos], end_s)
 
     def _value(self, servo: EmulatedServo, address: int, length: int) -> Part:
@@ -227,12 +201,12 @@ class EmulatedBus:
         address, data = int.from_bytes(instruction.parameters[:2], "little"), instruction.parameters[2:]
         for servo in self._followers(instruction.servo, end_s):
             if servo.servo != instruction.servo:
-                _attempt(partial(servo.write, address, data))
+                _attempt(servo.write, address, data)
         deliveries: list[Delivery] = []
         for servo in self._find_addressed(instruction, end_s):
             level = servo.memory.get("Status Return Level")
             write = servo.write if instruction.code == WRITE else servo.register
-            error = _attempt(partial(write, address, data))
+            error = _attempt(write, address, data)
             if instruction.servo != BROADCAST_ID and level == 2:
                 deliveries += self._answer(servo, error, b"", end_s)
         return deliveries
@@ -282,7 +256,7 @@ class EmulatedBus:
         data = instruction.parameters[4:]
         for start in range(0, len(data) - length, 1 + length):
             for servo in self._followers(data[start], end_s):
-                _attempt(partial(servo.write, address, data[start + 1 : start + 1 + length]))
+                _attempt(servo.write, address, data[start + 1 : start + 1 + length])
         return []
 
     def _bulk_read(self, instruction: Instruction, end_s: float) -> list[Delivery]:
@@ -299,7 +273,7 @@ class EmulatedBus:
         while start + 5 <= len(data):
             address, length = _words(data[start + 1 : start + 5])
             for servo in self._followers(data[start], end_s):
-                _attempt(partial(servo.write, address, data[start + 5 : start + 5 + length]))
+                _attempt(servo.write, address, data[start + 5 : start + 5 + length])
             start += 5 + length
         return []
 
@@ -308,10 +282,10 @@ class EmulatedBus:
         return [servo for servo in self._present(now_s) if number in (servo.servo, servo.secondary)]
 
 
-def _attempt(act: Callable[[], None]) -> int:
+def _attempt(act: Callable[..., None], *what: Any) -> int:
     """Error of what a servo was asked to do; 0 where it did."""
     try:
-        act()
+        act(*what)
     except WriteRefusedError as refusal:
         return refusal.error
     return 0

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 from dynamixel_easy_sdk import ControlTable
 
@@ -103,7 +104,7 @@ class ControlMemory:
         self.items = {name: (item.address, item.size) for name, item in table.items() if "Indirect" not in name}
         self._starts = {address: (name, size) for name, (address, size) in self.items.items()}
         self._values = dict.fromkeys(self.items, 0)
-        self._touched: dict[tuple[int, int], list[tuple[str, int, int]]] = {}
+        self._items_in = cache(self._find_items)  # masters ask for the same ones each cycle
         self.deliver()
 
     def __contains__(self, name: str) -> bool:
@@ -131,17 +132,13 @@ class ControlMemory:
             stretch[begin - address : end - address] = value[begin - start : end - start]
         return bytes(stretch)
 
-    def _items_in(self, address: int, length: int) -> list[tuple[str, int, int]]:
-        """Items that a stretch touches, with their first address and size; masters ask for the same ones each cycle."""
-        found = self._touched.get((address, length))
-        if found is None:
-            found = [
-                (name, start, size)
-                for name, (start, size) in self.items.items()
-                if start < address + length and address < start + size
-            ]
-            self._touched[(address, length)] = found
-        return found
+    def _find_items(self, address: int, length: int) -> list[tuple[str, int, int]]:
+        """Items that a stretch touches, with their first address and size."""
+        return [
+            (name, start, size)
+            for name, (start, size) in self.items.items()
+            if start < address + length and address < start + size
+        ]
 
     def write(self, address: int, data: bytes) -> list[str]:
         """Write whole items as a master does. Raises WriteRefusedError where nothing was written."""

@@ -3,19 +3,16 @@
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 
-from tauscope_sim.dynamixel_bus.arm import Pendulums
+from tauscope_sim.dynamixel_bus.arm import Pendulums, ServoArm
 from tauscope_sim.dynamixel_bus.bus import EmulatedBus
 from tauscope_sim.dynamixel_bus.control_memory import ServoSpecification
 from tauscope_sim.dynamixel_bus.servo import EmulatedServo
 from tauscope_sim.emulation.emulator import ALL_STEPS, STEP_S, Emulator, EmulatorOrder
 from tauscope_sim.emulation.fault_kit import InjectedFault, TimedQueue
-
-if TYPE_CHECKING:
-    from tauscope_sim.dynamixel_bus.plant_arm import PlantArm
 
 _Servo = TypeVar("_Servo")
 
@@ -23,13 +20,13 @@ _Servo = TypeVar("_Servo")
 class DynamixelEmulator(Emulator):
     """An arm of emulated servos on one bus; the instants are those of the caller's clock."""
 
-    def __init__(self, bus: EmulatedBus, arm: "Pendulums | PlantArm", now_s: float, *, latency_s: float = 0.0) -> None:
+    arm: ServoArm
+
+    def __init__(self, bus: EmulatedBus, arm: ServoArm, now_s: float, *, latency_s: float = 0.0) -> None:
         """Everything at rest, on a stand until all servos had torque. `latency_s`: of an adapter, for answers [s]."""
-        super().__init__(now_s)
+        super().__init__(arm, now_s)
         self.bus = bus
-        self.arm = arm
-        self.stands_on_stand = True
-        self.torque = np.zeros(arm.joint_count)
+        self.torque = np.zeros(len(bus.servos))
         self.servos = list(bus.servos.values())  # in the order of the joints
         self._bauds = {servo.specification.baud for servo in self.servos}
         self._latency_s = latency_s
@@ -47,7 +44,7 @@ class DynamixelEmulator(Emulator):
         its sleep is no silence of the master.
         """
         instructions = self.bus.hear(data, now_s)
-        self._clock.catch_up(now_s, self._step, ALL_STEPS)
+        self.advance_to(now_s, ALL_STEPS)
         for servo in self.servos:
             servo.sense(self.now_s, min(1.0, max(0.0, now_s - self.now_s) / STEP_S))
         for due_s, frame in self.bus.answer(instructions, now_s):
@@ -64,19 +61,13 @@ class DynamixelEmulator(Emulator):
 
     def describe(self) -> dict[str, Any]:
         """Where the arm is and what its servos do."""
-        position, velocity = self.arm.motion
-        return {
-            "time": self.now_s,
-            "position": position.tolist(),
-            "velocity": velocity.tolist(),
+        return super().describe() | {
             "torque": self.torque.tolist(),
             "enabled": [servo.has_torque for servo in self.servos],
             "latched": [servo.memory.is_latched for servo in self.servos],
             "commanded": [servo.is_commanded for servo in self.servos],
             "latched_at": [servo.latched_s for servo in self.servos],
             "error": [servo.hardware_error for servo in self.servos],
-            "on_stand": self.stands_on_stand,
-            "lost": self._clock.lost_s,
         }
 
     def get(self, device: int, place: str) -> int:
@@ -87,10 +78,6 @@ class DynamixelEmulator(Emulator):
         """Set an item."""
         self.bus.servos[device].memory.put(place, value)
 
-    def set_stand(self, is_there: bool) -> None:
-        """Put the stand under the arm, or take it away."""
-        self.stands_on_stand = is_there
-
     def _step(self) -> None:
         self._run_faults()
         position, _ = self.arm.motion
@@ -98,9 +85,9 @@ class DynamixelEmulator(Emulator):
             servo.demand(float(place), self.now_s, STEP_S) for servo, place in zip(self.servos, position, strict=True)
         ]
         self.torque = self.arm.torque(demands)
-        if self.stands_on_stand:
-            self.stands_on_stand = not all(servo.has_torque for servo in self.servos)
-        if not self.stands_on_stand:
+        if self.arm.stands_on_stand:
+            self.arm.stands_on_stand = not all(servo.has_torque for servo in self.servos)
+        if not self.arm.stands_on_stand:
             self.arm.advance(self.torque, STEP_S)
         self._look()
 
@@ -139,7 +126,7 @@ class ServoOrder(EmulatorOrder, Generic[_Servo]):
         """The emulator."""
         return DynamixelEmulator(self.make_bus(), self._arm(), now_s, latency_s=self.latency_s)
 
-    def _arm(self) -> "Pendulums | PlantArm":
+    def _arm(self) -> ServoArm:
         if self.robot is None:
             return Pendulums(self.start, weight=self.weight)
         # The physics take seconds to import; a test of the bus alone does without.

@@ -23,7 +23,6 @@ class Demand:
 
     tracks: bool
     position: float = 0.0  # target [rad or m]
-    speed: float = 0.0  # of the target [rad/s or m/s]
     torque: float = 0.0  # where it does not track [Nm or N]
     cap: float = 0.0  # most that it exerts [Nm or N]
 
@@ -57,8 +56,8 @@ class ServoLoop:
         memory, unit = self._memory, abs(self._specification.torque_per_unit)
         limit = memory.get("Current Limit")
         if memory.get("Operating Mode") in (POSITION_MODE, EXTENDED_MODE, CURRENT_BASED_MODE):
-            target, speed = self._move_target(position, duration_s)
-            return Demand(tracks=True, position=target, speed=speed, cap=min(limit, self._position_cap()) * unit)
+            target = self._move_target(position, duration_s)
+            return Demand(tracks=True, position=target, cap=min(limit, self._position_cap()) * unit)
         goal = 0 if self._held is not None else memory.get("Goal Current")
         current = max(-limit, min(limit, goal))
         return Demand(tracks=False, torque=current * self._specification.torque_per_unit, cap=limit * unit)
@@ -71,25 +70,18 @@ class ServoLoop:
             return abs(memory.get("Goal Current"))
         return memory.get("Current Limit")
 
-    def _move_target(self, position: float, duration_s: float) -> tuple[float, float]:
-        """Target and its speed: the goal, approached no faster than Profile Velocity allows (0: at once)."""
+    def _move_target(self, position: float, duration_s: float) -> float:
+        """The goal, approached no faster than Profile Velocity allows (0: at once)."""
         if self._held is not None:
             self._target = None
-            return self._held, 0.0
+            return self._held
         counts = self._memory.get("Goal Position") - self._specification.figures.zero_count
         goal = counts / self._specification.counts_per_radian
-        fastest = self._memory.get("Profile Velocity") * self._velocity_unit
+        unit = self._specification.figures.velocity_unit / self._specification.reduction
+        most = self._memory.get("Profile Velocity") * unit * duration_s
         target = position if self._target is None else self._target
-        if fastest == 0.0:
-            self._target = goal
-            return goal, 0.0
-        step = max(-fastest * duration_s, min(fastest * duration_s, goal - target))
-        self._target = target + step
-        return self._target, 0.0
-
-    @property
-    def _velocity_unit(self) -> float:
-        return self._specification.figures.velocity_unit / self._specification.reduction
+        self._target = target + max(-most, min(most, goal - target)) if most else goal
+        return self._target
 
 
 OVERHEATING, ENCODER, ELECTRICAL, OVERLOAD = 0x04, 0x08, 0x10, 0x20

@@ -11,6 +11,7 @@ from tauscope.errors import ScenarioError
 from tauscope.robot.document_fields import Document, Number, Positive, refusal
 from tauscope.robot.messages import shown
 from tauscope.robot.robot import Joint, Robot
+from tauscope_sim.friction import shape_constants, smooth_sign, smooth_sign_slope
 from tauscope_sim.plant.term import Coordinates, Forces, Moment, PhysicalEffect, Slopes, Term
 
 LARGEST_EXPONENT = 10.0  # of a power law in speed or angle
@@ -75,9 +76,10 @@ class ScenarioEntry(Document):
 
     def check(self, robot: Robot) -> None:
         """Refuse an entry that this robot cannot have. Raises ScenarioError naming effect and key."""
-        joint = getattr(self, "joint", None)
-        if joint is not None and joint > robot.joint_count:
-            raise self.refused("joint", f"is {joint}, but the arm has {robot.joint_count} joints")
+        for key, kind in (("joint", "joints"), ("other_joint", "joints"), ("link", "links")):
+            number = getattr(self, key, None)
+            if number is not None and number > robot.joint_count:
+                raise self.refused(key, f"is {number}, but the arm has {robot.joint_count} {kind}")
 
     def refused(self, key: str, text: str) -> ScenarioError:
         return ScenarioError(f"{self.effect_id}.{key}: {text}")
@@ -162,3 +164,22 @@ class _LawTerm(Term):
         by_position, by_velocity = self._slopes(moment.position[place], moment.velocity[place])
         slopes.by_position[place, place] += by_position
         slopes.by_velocity[place, place] += by_velocity
+
+
+class CoulombTerm(Term):
+    """What changes the robot file's static friction of one joint, by an internal state of its own."""
+
+    state_count = 1
+
+    def __init__(self, effect: JointEffect, robot: Robot, coordinates: Coordinates) -> None:
+        self._joint, self._place = effect.index, coordinates.motor(effect.index)
+        self._friction = (robot.model.friction or ())[effect.index]
+        ((self._k_v, self._delta),) = shape_constants([self._friction], [effect.joint_of(robot).friction_shape])
+        self._stiction, self._stribeck = self._friction.stiction, self._friction.stribeck
+
+    def _level(self, v: float) -> float:
+        """τ_s A(v) + τ_sc A_δ(v)."""
+        return self._stiction * smooth_sign(v, self._k_v) + self._stribeck * smooth_sign(v, self._delta)
+
+    def _slope(self, v: float) -> float:
+        return self._stiction * smooth_sign_slope(v, self._k_v) + self._stribeck * smooth_sign_slope(v, self._delta)

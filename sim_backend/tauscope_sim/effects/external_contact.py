@@ -47,11 +47,9 @@ class ExternalContact(Effect):
 
 class _Contact(Term):
     def __init__(self, contact: ExternalContact) -> None:
+        self._contact, self._offset = contact, np.array(contact.offset)
         self._force = None if contact.force is None else np.array(contact.force)
-        self._offset = np.array(contact.offset)
         self._joint, self._torque = (contact.joint or 1) - 1, contact.torque or 0.0
-        self._start, self._duration = contact.start, contact.duration
-        self._smooth = contact.profile == "half_sine"
         self.event_times = (contact.start, contact.start + contact.duration)
         self._touching = False
 
@@ -61,7 +59,9 @@ class _Contact(Term):
     def act(self, moment: Moment, forces: Forces) -> None:
         if not self._touching:
             return
-        share = math.sin(math.pi * (moment.time - self._start) / self._duration) if self._smooth else 1.0
+        contact, share = self._contact, 1.0
+        if contact.profile == "half_sine":
+            share = math.sin(math.pi * (moment.time - contact.start) / contact.duration)
         if self._force is None:
             forces.link[self._joint] += share * self._torque
         else:

@@ -24,24 +24,19 @@ class FrictionCoupling(SmoothSignEffect):
 
     def check(self, robot: Robot) -> None:
         super().check(robot)
-        if self.other_joint > robot.joint_count:
-            raise self.refused("other_joint", f"is {self.other_joint}, but the arm has {robot.joint_count} joints")
         if self.other_joint == self.joint:
             raise self.refused("other_joint", f"is {self.joint} too; name the joint that it is coupled with")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        joints = (self.index, self.other_joint - 1)
-        places = (coordinates.motor(joints[0]), coordinates.motor(joints[1]))
-        sign = 1.0 if self.of == "sum" else -1.0
-        return (_Coupling(joints, places, sign, self.coulomb, self.viscous, self.steepness(robot)),)
+        return (_Coupling(self, coordinates, self.steepness(robot)),)
 
 
 class _Coupling(Term):
-    def __init__(
-        self, joints: tuple[int, int], places: tuple[int, int], sign: float, coulomb: float, viscous: float, k_v: float
-    ) -> None:
-        self._joints, self._places, self._sign = joints, places, sign
-        self._coulomb, self._viscous, self._k_v = coulomb, viscous, k_v
+    def __init__(self, effect: FrictionCoupling, coordinates: Coordinates, k_v: float) -> None:
+        self._joints = first, second = effect.index, effect.other_joint - 1
+        self._places = coordinates.motor(first), coordinates.motor(second)
+        self._sign = 1.0 if effect.of == "sum" else -1.0
+        self._coulomb, self._viscous, self._k_v = effect.coulomb, effect.viscous, k_v
 
     def act(self, moment: Moment, forces: Forces) -> None:
         w = self._motion(moment)

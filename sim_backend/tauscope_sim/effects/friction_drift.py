@@ -15,8 +15,7 @@ from typing import ClassVar
 
 from tauscope.robot.document_fields import Number, Positive
 from tauscope.robot.robot import Array, Robot
-from tauscope_sim.effects.effect import JointEffect
-from tauscope_sim.friction import shape_constants, smooth_sign, smooth_sign_slope
+from tauscope_sim.effects.effect import CoulombTerm, JointEffect
 from tauscope_sim.plant.term import AMBIENT, Coordinates, Forces, Moment, Slopes, Term
 
 LARGEST_EXPONENT = 20.0  # beyond any oil: keeps nonsense coefficients from overflowing
@@ -38,22 +37,13 @@ class FrictionDrift(JointEffect):
             raise self.refused("joint", "has no friction in the robot file that could drift; state model.friction")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        friction = (robot.model.friction or ())[self.index]
-        shape = shape_constants([friction], [self.joint_of(robot).friction_shape])[0]
-        place = coordinates.motor(self.index)
-        levels = (friction.stiction, friction.stribeck, friction.viscous)
-        return (_WarmingFriction(self, place, levels, shape),)
+        return (_WarmingFriction(self, robot, coordinates),)
 
 
-class _WarmingFriction(Term):
-    state_count = 1
-
-    def __init__(
-        self, drift: FrictionDrift, place: int, levels: tuple[float, float, float], shape: tuple[float, float]
-    ) -> None:
-        self._joint, self._place = drift.index, place
-        self._stiction, self._stribeck, self._viscous = levels
-        self._k_v, self._delta = shape
+class _WarmingFriction(CoulombTerm):
+    def __init__(self, drift: FrictionDrift, robot: Robot, coordinates: Coordinates) -> None:
+        super().__init__(drift, robot, coordinates)
+        self._viscous = self._friction.viscous
         self._coefficients = (drift.coulomb_per_kelvin, drift.viscous_per_kelvin)
         self._resistance, self._time_constant = drift.thermal_resistance, drift.time_constant
         self._start = drift.initial_temperature - AMBIENT
@@ -64,8 +54,7 @@ class _WarmingFriction(Term):
     def act(self, moment: Moment, forces: Forces) -> None:
         v = moment.velocity[self._place]
         coulomb, viscous = self._changes(moment)
-        level = self._stiction * smooth_sign(v, self._k_v) + self._stribeck * smooth_sign(v, self._delta)
-        forces.friction[self._joint] += coulomb * level + viscous * self._viscous * v
+        forces.friction[self._joint] += coulomb * self._level(v) + viscous * self._viscous * v
 
     def rates(self, moment: Moment, rates: list[float]) -> None:
         heat = moment.friction[self._joint] * moment.velocity[self._place]
@@ -75,8 +64,7 @@ class _WarmingFriction(Term):
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
         v, place = moment.velocity[self._place], self._place
         coulomb, viscous = self._changes(moment)
-        level = self._stiction * smooth_sign_slope(v, self._k_v) + self._stribeck * smooth_sign_slope(v, self._delta)
-        slopes.by_velocity[place, place] += coulomb * level + viscous * self._viscous
+        slopes.by_velocity[place, place] += coulomb * self._slope(v) + viscous * self._viscous
         slopes.rate_by_state[self.first_state, self.first_state] -= 1.0 / self._time_constant
 
     def report_temperature(self, states: list[float], temperature: Array) -> None:

@@ -40,8 +40,6 @@ class KinematicError(Effect):
 
     def check(self, robot: Robot) -> None:
         super().check(robot)
-        if self.link > robot.joint_count:
-            raise self.refused("link", f"is {self.link}, but the arm has {robot.joint_count} links")
         if not any(self.translation) and not any(self.rotation):
             raise self.refused("translation", "and rotation are zero; state one of them")
 

@@ -15,8 +15,8 @@ from typing import Annotated, ClassVar
 
 from tauscope.robot.document_fields import Positive
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import JointEffect, NotNegative, one_of
-from tauscope_sim.friction import shape_constants, smooth_sign, smooth_sign_slope
+from tauscope_sim.effects.effect import CoulombTerm, JointEffect, NotNegative, one_of
+from tauscope_sim.friction import smooth_sign
 from tauscope_sim.plant.term import Coordinates, Forces, Moment, Slopes, Term
 
 
@@ -38,39 +38,23 @@ class PreslidingHysteresis(JointEffect):
             raise self.refused("damping", "belongs to the LuGre model; state bristles: lugre or remove it")
 
     def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        friction = (robot.model.friction or ())[self.index]
-        shape = shape_constants([friction], [self.joint_of(robot).friction_shape])[0]
-        levels = (friction.stiction, friction.stribeck if self.bristles == "lugre" else 0.0)
-        place = coordinates.motor(self.index)
-        return (_Bristles(self.index, place, levels, shape, self.distance, self.damping),)
+        return (_Bristles(self, robot, coordinates),)
 
 
-class _Bristles(Term):
+class _Bristles(CoulombTerm):
     """LuGre's bristles; Dahl's are those without Stribeck part and damping."""
 
-    state_count = 1
-
-    def __init__(
-        self,
-        joint: int,
-        place: int,
-        levels: tuple[float, float],
-        shape: tuple[float, float],
-        distance: float,
-        damping: float,
-    ) -> None:
-        self._joint, self._place = joint, place
-        self._stiction, self._stribeck = levels
-        self._k_v, self._delta = shape
-        self._distance, self._damping = distance, damping * distance
+    def __init__(self, effect: PreslidingHysteresis, robot: Robot, coordinates: Coordinates) -> None:
+        super().__init__(effect, robot, coordinates)
+        self._stribeck = self._stribeck if effect.bristles == "lugre" else 0.0
+        self._distance, self._damping = effect.distance, effect.damping * effect.distance
 
     def initial_states(self) -> tuple[float, ...]:
         return (0.0,)
 
     def act(self, moment: Moment, forces: Forces) -> None:
         v, z = moment.velocity[self._place], moment.states[self.first_state]
-        replaced = self._stiction * smooth_sign(v, self._k_v) + self._stribeck * smooth_sign(v, self._delta)
-        forces.friction[self._joint] += self._stiction * z + self._damping * self._rate(v, z) - replaced
+        forces.friction[self._joint] += self._stiction * z + self._damping * self._rate(v, z) - self._level(v)
 
     def rates(self, moment: Moment, rates: list[float]) -> None:
         rates[self.first_state] = self._rate(moment.velocity[self._place], moment.states[self.first_state])
@@ -78,17 +62,17 @@ class _Bristles(Term):
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
         place, state = self._place, self.first_state
         v, z = moment.velocity[place], moment.states[state]
-        level = self._level(v)
+        level = self._bend(v)
         by_velocity = (1.0 - math.copysign(z / level, v)) / self._distance
         by_state = -abs(v) / level / self._distance
         slopes.rate_by_velocity[state, place] += by_velocity
         slopes.rate_by_state[state, state] += by_state
-        replaced = self._stiction * smooth_sign_slope(v, self._k_v) + self._stribeck * smooth_sign_slope(v, self._delta)
-        slopes.by_velocity[place, place] += self._damping * by_velocity - replaced
+        slopes.by_velocity[place, place] += self._damping * by_velocity - self._slope(v)
         slopes.by_state[place, state] += self._stiction + self._damping * by_state
 
-    def _level(self, v: float) -> float:
+    def _bend(self, v: float) -> float:
+        """g(v)."""
         return 1.0 + self._stribeck / self._stiction * smooth_sign(abs(v), self._delta)
 
     def _rate(self, v: float, z: float) -> float:
-        return (v - abs(v) * z / self._level(v)) / self._distance
+        return (v - abs(v) * z / self._bend(v)) / self._distance

@@ -13,6 +13,9 @@ from dataclasses import asdict, dataclass
 from math import ceil
 from typing import Any, Protocol, Self
 
+import numpy as np
+
+from tauscope.robot.robot import Array
 from tauscope_sim.emulation.fault_kit import InjectedFault, TimedQueue, faults_from
 
 STEP_S = 1e-3  # period of the devices' own loops and of the physics [s]
@@ -46,13 +49,25 @@ class DeviceClock:
             step()
 
 
+class MovedArm(Protocol):
+    """What devices move; it stands on a stand until all of them have had torque once."""
+
+    stands_on_stand: bool
+
+    @property
+    def motion(self) -> tuple[Array, Array]:
+        """Position and velocity of the motors, in joint units, each (n,)."""
+        ...
+
+
 class Emulator(ABC):
     """Devices on one bus with the arm that they move; the instants are those of the server's clock."""
 
-    def __init__(self, now_s: float) -> None:
-        """Everything at rest; the arm stands on a stand until all its devices have had torque once."""
-        self._clock = DeviceClock(now_s)
+    def __init__(self, arm: MovedArm, now_s: float) -> None:
+        """Everything at rest."""
+        self.arm = arm
         self.schedule = TimedQueue[InjectedFault]()
+        self._clock = DeviceClock(now_s)
 
     @property
     def now_s(self) -> float:
@@ -80,9 +95,11 @@ class Emulator(ABC):
     def due(self, now_s: float) -> bytes:
         """Bytes that have reached the master by now."""
 
-    @abstractmethod
     def describe(self) -> dict[str, Any]:
         """What the devices are doing, as plain data."""
+        position, velocity = map(np.ndarray.tolist, self.arm.motion)
+        on_stand, lost = self.arm.stands_on_stand, self._clock.lost_s
+        return {"time": self.now_s, "position": position, "velocity": velocity, "on_stand": on_stand, "lost": lost}
 
     def answer(self, request: dict[str, Any]) -> dict[str, int] | None:
         """Do what a test asks.
@@ -98,7 +115,7 @@ class Emulator(ABC):
         elif "put" in request:
             self.put(*request["put"])
         elif "stand" in request:
-            self.set_stand(request["stand"])
+            self.arm.stands_on_stand = request["stand"]
         return None
 
     def inject(self, faults: list[InjectedFault]) -> None:
@@ -122,10 +139,6 @@ class Emulator(ABC):
     @abstractmethod
     def put(self, device: int, place: Any, value: int) -> None:
         """Set what a device holds, behind the master's back."""
-
-    @abstractmethod
-    def set_stand(self, is_there: bool) -> None:
-        """Put the stand under the arm, or take it away."""
 
     @abstractmethod
     def _step(self) -> None:

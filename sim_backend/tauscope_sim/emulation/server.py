@@ -13,7 +13,6 @@ import threading
 import time
 from importlib import import_module
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from tauscope_sim.emulation.emulator import MOST_STEPS, EmulatorOrder, Port
@@ -40,9 +39,7 @@ class Arrivals:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         os.eventfd_write(self._end, 1)
         self._thread.join()
         os.close(self._wake)
@@ -133,13 +130,8 @@ class EmulatorServer:
         if not self._order.stepped:
             due_s = min(due_s, self._emulator.now_s + _PERIOD_S)
         wait_s = min(_PERIOD_S, max(0.0, due_s - self._now_s))
-        sources: list[Any] = [self._tests, sys.stdin]
-        if self._arrivals is not None:
-            sources.append(self._arrivals)
-        elif self._master_is_there:
-            sources.append(self._port)
-        if self._test is not None:
-            sources.append(self._test)
+        master = self._arrivals or (self._port if self._master_is_there else None)
+        sources = [one for one in (self._tests, sys.stdin, master, self._test) if one is not None]
         ready = select.select(sources, [], [], wait_s)[0]
         if sys.stdin in ready and not os.read(sys.stdin.fileno(), 1):
             self._running = False

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from functools import reduce
 from math import atan, pi
-from typing import NamedTuple
 
 import numpy as np
 
@@ -79,18 +78,6 @@ def _twist(moment: Moment, joint: int, motor: int) -> tuple[float, float]:
 _SCALE = 2.0 / pi
 
 
-class _Law(NamedTuple):
-    """Friction of one joint: its number from 0, the place of its motor, levels times 2/π, steepnesses, τ_v."""
-
-    joint: int
-    place: int
-    stiction: float
-    k_v: float
-    stribeck: float
-    delta: float
-    viscous: float
-
-
 class StaticFriction(Term):
     """τ_f = τ_s (2/π) arctan(K_v v) + τ_sc (2/π) arctan(δ v) + τ_v v; RobotFileError without a shape constant."""
 
@@ -101,8 +88,9 @@ class StaticFriction(Term):
         coordinates: Coordinates,
     ) -> None:
         constants = shape_constants(friction, friction_shape)
+        # number from 0, place of the motor, levels times 2/π, steepnesses, τ_v
         self._laws = [
-            _Law(joint, coordinates.motor(joint), one.stiction * _SCALE, k_v, one.stribeck * _SCALE, delta, one.viscous)
+            (joint, coordinates.motor(joint), one.stiction * _SCALE, k_v, one.stribeck * _SCALE, delta, one.viscous)
             for joint, (one, (k_v, delta)) in enumerate(zip(friction, constants, strict=True))
         ]
 

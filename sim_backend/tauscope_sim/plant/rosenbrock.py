@@ -96,10 +96,5 @@ class RosenbrockStep:
 
 def _largest(differences: list[float], passing: list[float]) -> float:
     """Largest difference by what may pass; NaN where one is not finite."""
-    largest = 0.0
-    for difference, passes in zip(differences, passing, strict=True):
-        error = abs(difference) / passes
-        if not isfinite(error):
-            return nan
-        largest = max(largest, error)
-    return largest
+    errors = [abs(difference) / passes for difference, passes in zip(differences, passing, strict=True)]
+    return max(errors) if all(map(isfinite, errors)) else nan

@@ -7,7 +7,7 @@ import pytest
 
 from hardware_emulated.campaign_arms import six_joints
 from tauscope.robot import Robot, robot_from_dict
-from tauscope_sim.canopen_bus.drive import AxisDemand, AxisMeasurement, AxisMode, EmulatedDrive
+from tauscope_sim.canopen_bus.drive import AxisDemand, AxisMode, EmulatedDrive
 from tauscope_sim.canopen_bus.driven_arm import FASTEST, DrivenArm
 from tauscope_sim.emulation.emulator import STEP_S
 from tauscope_sim.scenario import Scenario
@@ -26,7 +26,7 @@ class FollowingDrive:
     def demand(self) -> AxisDemand:
         return AxisDemand(AxisMode.POSITION, self.target, 0.0, self._torque_cap, CYCLE * STEP_S)
 
-    def measure(self, measurement: AxisMeasurement) -> None:
+    def measure(self, position: float, velocity: float, torque: float) -> None:
         pass
 
 

@@ -14,17 +14,12 @@ from canopen.objectdictionary import ObjectDictionaryError, ODVariable, datatype
 from tauscope_drivers.canopen import objects
 from tauscope_drivers.canopen.objects import DriveObject
 
-_KEYWORDS = {
-    word.lower(): word
-    for word in (
-        *("ParameterName", "ObjectType", "DataType", "AccessType", "PDOMapping", "DefaultValue", "ParameterValue"),
-        *("CompactSubObj", "VendorNumber", "ProductNumber", "RevisionNumber", "NodeID"),
-    )
-}
 _NUMBERS = (
     *("ObjectType", "DataType", "PDOMapping", "CompactSubObj"),
     *("VendorNumber", "ProductNumber", "RevisionNumber", "NodeID"),
 )
+_TEXTUAL = ("ParameterName", "AccessType", "DefaultValue", "ParameterValue")
+_KEYWORDS = {word.lower(): word for word in (*_NUMBERS, *_TEXTUAL)}
 _OBJECT = re.compile(r"([0-9a-f]{1,4})(?:sub([0-9a-f]{1,2})|(value|name))?", re.IGNORECASE | re.ASCII)
 _DEVICE = {
     "deviceinfo": "DeviceInfo",

@@ -27,7 +27,7 @@ def find_flaws(file: DeviceFile, *, reads_rated_torque: bool) -> list[str]:
         flaws.append(f"{heartbeat}, and {unguarded[0]}: the drive would not notice that the host is gone")
     flaws += [flaw for entry in SUBSTITUTES if _find(file, entry) and (flaw := _flaw(file, entry))]
     flaws += [flaw for entry in process_data.MEASURED if (flaw := _flaw(file, entry, is_mapped=True))]
-    flaws += _target_flaws(file, ControlMode.POSITION)
+    flaws += find_target_flaws(file, ControlMode.POSITION)
     if flaws and reads_rated_torque and not states_rated_torque(file):
         flaws.append(f"{objects.RATED_TORQUE} is missing: give drive.rated_torque_nm")
     return flaws
@@ -43,16 +43,6 @@ def states_rated_torque(file: DeviceFile) -> bool:
     return _flaw(file, objects.RATED_TORQUE) is None
 
 
-def require_needed(file: DeviceFile, *, reads_rated_torque: bool) -> None:
-    """Refuse a drive that the driver cannot use. Raises DataSheetError, which names every flaw."""
-    _refuse(find_flaws(file, reads_rated_torque=reads_rated_torque))
-
-
-def require_target(file: DeviceFile, mode: ControlMode) -> None:
-    """Refuse a drive that takes no targets of a mode. Raises DataSheetError, which names the object."""
-    _refuse(_target_flaws(file, mode))
-
-
 def pdo_slots(file: DeviceFile) -> process_data.PdoSlots:
     """The PDOs of a drive, and which of them can be mapped."""
     received, sent = (
@@ -62,7 +52,7 @@ def pdo_slots(file: DeviceFile) -> process_data.PdoSlots:
     return process_data.PdoSlots(received, sent)
 
 
-def _target_flaws(file: DeviceFile, mode: ControlMode) -> list[str]:
+def find_target_flaws(file: DeviceFile, mode: ControlMode) -> list[str]:
     """Why a drive takes no targets of a mode, and gives no measurements meanwhile."""
     described = _find(file, objects.SUPPORTED_MODES)
     stated = None if described is None else described.default
@@ -132,7 +122,8 @@ def _find(file: DeviceFile, entry: DriveObject) -> DescribedObject | None:
     return file.objects.get((entry.index, entry.subindex))
 
 
-def _refuse(flaws: list[str]) -> None:
+def refuse(flaws: list[str]) -> None:
+    """Refuse a drive that has flaws. Raises DataSheetError, which names every one."""
     if flaws:
         raise DataSheetError(f"{'; '.join(flaws)}; check that it is the file of this drive, or use another drive")
 

@@ -17,7 +17,7 @@ from tauscope_drivers.canopen.dry_run import plan_frames
 from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_drivers.inspection import FrameRequest, Severity
-from tauscope_sim.canopen_bus.object_dictionary import Abort, AbortError
+from tauscope_sim.canopen_bus.object_dictionary import Abort, AbortError, Entry
 
 FREE = np.full(3, np.inf)
 LIMITS = DriveLimits(-FREE, FREE, FREE, np.full(3, 20.0))
@@ -29,12 +29,12 @@ SECOND = 1
 def bus() -> Iterator[EmulatedBus]:
     with EmulatedBus() as emulated:
         for drive in emulated.drives:
-            dictionary = drive.dictionary
+            entries = drive.dictionary.entries
             for subindex, value in ((1, VENDOR), (2, PRODUCT), (3, REVISION)):
-                dictionary.add(0x1018, subindex, 4, value, writable=False)
-            dictionary.add(0x2001, 0, 2, 100)
-            dictionary.add(0x2002, 0, 2, -3, signed=True)
-            dictionary.add(0x2004, 0, 1, 0)
+                entries[0x1018, subindex] = Entry(4, value, writable=False)
+            entries[0x2001, 0] = Entry(2, 100)
+            entries[0x2002, 0] = Entry(2, -3, signed=True)
+            entries[0x2004, 0] = Entry(1, 0)
         yield emulated
 
 
