@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.io
 from pydantic_core import from_json
 
 from tauscope.errors import RecordingError
@@ -88,7 +87,9 @@ def _read_matlab(path: Path, name: str) -> dict[str, Any]:
     for piece in _unpack_matlab(content):
         unpacked_bytes += len(piece)
         require_plausible_inflation(len(content), unpacked_bytes, name, HELD_BYTES)
-    found = _flatten(scipy.io.loadmat(path, simplify_cells=True), "")
+    from scipy.io import loadmat  # not wanted where other files are read
+
+    found = _flatten(loadmat(path, simplify_cells=True), "")
     return {key: array for key, array in found if isinstance(array, np.ndarray)}
 
 

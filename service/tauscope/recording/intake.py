@@ -85,7 +85,7 @@ class CounterClock:
         self.count = 0  # how often it began again
 
     def unwrap(self, counts: Array) -> Array:
-        """Counts that rise on, (rows,), of those in the file, (rows,), block by block."""
+        """Counts that rise on, (rows,), block by block; `counts`: (rows,), those in the file."""
         steps, bases = np.diff(counts, prepend=self._last), np.full(len(counts), self._base)
         for size in (2.0**16, 2.0**32):
             # Another clock that is set back goes by a whole range, to a thousandth of it, by rare chance only.

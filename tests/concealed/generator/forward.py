@@ -95,8 +95,8 @@ def _played(robot: Robot, effects: tuple[Effect, ...], setpoints: Array) -> Pass
     for number, setpoint in enumerate(setpoints):
         arm.exchange(Setpoint(setpoint, zero))
         for part in range(1, FINE + 1):
-            sample = arm.device._mechanism._sample
-            rows.append((sample.position, sample.velocity, sample.torque))
+            _, position, velocity, torque = arm.device._mechanism._sample
+            rows.append((position, velocity, torque))
             arm.clock.wait_until_ns(number * step_ns + part * step_ns // FINE)
     position, velocity, torque = (np.array(column) for column in zip(*rows, strict=True))
     return Passage(position, velocity, torque)
