@@ -10,7 +10,7 @@ from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
+from scipy import ndimage, signal
 
 from tauscope.recording.recording import Array
 
@@ -81,6 +81,10 @@ class Decimator(BandFilter):
 
     def reduce(self, values: Array) -> Array:
         """Outputs whose whole kernel lies inside `values`, (..., N) → (..., M), M = max((N - K) // D + 1, 0)."""
+        if self.factor == 1:  # a product with one column a block would be ten times slower
+            first = len(self.kernel) // 2
+            whole = ndimage.correlate1d(values, self.kernel, axis=-1, mode="constant")
+            return whole[..., first : first + self._outputs(values.shape[-1])]
         blocks = len(self.kernel) // self.factor
         outputs = self._outputs(values.shape[-1])
         used = outputs + blocks - 1
