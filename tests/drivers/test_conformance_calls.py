@@ -230,7 +230,7 @@ def test_a_lost_sample_is_not_a_number_and_concerns_its_joint_alone(rig: Rig) ->
 )
 def test_a_drives_fault_is_decoded_and_stops_the_arm(rig: Rig, kind: Disturbance, size: float, code: str) -> None:
     enable(rig)
-    rig.inject(Injection(kind, joint=3, duration_ns=150_000_000, size=size))
+    rig.inject(Injection(kind, joint=3, duration_ns=1_000_000_000, size=size))
     (fault,) = rig.backend.exchange(setpoint(START)).faults
     assert (fault.code, fault.joint) == (code, 3)
     assert fault.detail
@@ -239,5 +239,5 @@ def test_a_drives_fault_is_decoded_and_stops_the_arm(rig: Rig, kind: Disturbance
     error = refusal(rig.backend.acknowledge_faults)
     assert error.kind is DriverErrorKind.FAULT
     assert [one.code for one in error.faults] == [code], "the cause persists"
-    assert not rig.watch(0.2).commanded.any()
+    assert not rig.watch(1.1).commanded.any()
     assert not rig.backend.acknowledge_faults().faults

@@ -4,8 +4,10 @@ import bz2
 import io
 import json
 import struct
+import tempfile
 import zipfile
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import lz4.frame
@@ -115,15 +117,19 @@ def write_npz_bombs() -> Iterator[tuple[str, bytes]]:
     yield "many.npz", text.getvalue()
 
 
+def write_matlab(arrays: dict[str, Any]) -> bytes:
+    """A packed MATLAB file."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "x.mat")
+        savemat(path, arrays, do_compression=True)
+        return path.read_bytes()
+
+
 def write_array_bombs() -> Iterator[tuple[str, bytes]]:
     """MATLAB files of zeros, and JSON that is deep, wide or of many objects."""
     for name, shape in (("zeros", (4_000_000, 1)), ("wide", (2, 2_000_000))):
-        text = io.BytesIO()
-        savemat(text, {"q": np.zeros(shape)}, do_compression=True)
-        yield f"{name}.mat", text.getvalue()
-    text = io.BytesIO()
-    savemat(text, {f"a{n}": np.zeros(1) for n in range(400)}, do_compression=True)
-    yield "many.mat", text.getvalue()
+        yield f"{name}.mat", write_matlab({"q": np.zeros(shape)})
+    yield "many.mat", write_matlab({f"a{n}": np.zeros(1) for n in range(400)})
     yield "deep.json", b'{"a": ' * (SMALL // 6)
     yield "keys.json", json.dumps({f"k{n}": [n] for n in range(SMALL // 14)}).encode()
     yield "objects.jsonl", b"{}\n" * (SMALL // 3)
