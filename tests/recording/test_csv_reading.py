@@ -181,7 +181,7 @@ BAD = {
     "UTF-16": ("\n".join(LINES).encode("utf-16"), "is UTF-16 text; save it as UTF-8"),
     "long line": (changed(17, "1," + "2" * 2**21), "line 17 has"),
     "long header": ("t" * 2**21, "line 1 has more than 1048576 characters"),
-    "gzip": (b"\x1f\x8b\x08\0\0\0", "is compressed by gzip; unpack it first"),
+    "damaged gzip": (b"\x1f\x8b\x08\0\0\0", "cannot be decompressed"),
     "spreadsheet": (b"PK\x03\x04\x14\0", "is a zip archive or a spreadsheet"),
     "period": ("t,q1,tau1,period\n" + "\n".join(f"{k},0,0,{k / 4}" for k in range(20)), "line 3, column period: 0.25"),
     "old line ends": ("\r".join(LINES), "the lines end with carriage returns alone"),

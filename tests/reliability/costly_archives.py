@@ -1,8 +1,10 @@
 """Small files that are costly to read, of the formats that pack, index or generate: MCAP, bags, NumPy, MJCF."""
 
 import bz2
+import gzip
 import io
 import json
+import lzma
 import struct
 import tempfile
 import zipfile
@@ -130,6 +132,9 @@ def write_array_bombs() -> Iterator[tuple[str, bytes]]:
     for name, shape in (("zeros", (4_000_000, 1)), ("wide", (2, 2_000_000))):
         yield f"{name}.mat", write_matlab({"q": np.zeros(shape)})
     yield "many.mat", write_matlab({f"a{n}": np.zeros(1) for n in range(400)})
+    for suffix, pack in (("gz", gzip.compress), ("bz2", bz2.compress), ("xz", lzma.compress)):
+        yield f"zeros.csv.{suffix}", pack(bytes(30_000_000))
+        yield f"twice.csv.{suffix}", pack(pack(bytes(30_000_000)))
     yield "deep.json", b'{"a": ' * (SMALL // 6)
     yield "keys.json", json.dumps({f"k{n}": [n] for n in range(SMALL // 14)}).encode()
     yield "objects.jsonl", b"{}\n" * (SMALL // 3)

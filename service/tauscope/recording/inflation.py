@@ -1,5 +1,10 @@
 """Compressed data: unpacked, and refused before files that unpack to far more than a recording fill memory or disk."""
 
+import bz2
+import gzip
+import lzma
+import zlib
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import zstandard
@@ -52,15 +57,58 @@ def decompress_message(message: bytes) -> bytes:
         raise ValueError(f"the compressed message is damaged: {error}") from error
 
 
-def decompress_file(source: Path, target: Path, name: str) -> Path:
+def _unpack_zstd(path: Path) -> Iterator[bytes]:
+    """Frame by frame: the library's own file ends without a word where a frame is cut short."""
+    begin = zstandard.ZstdDecompressor().decompressobj
+    unpacking = begin()
+    with path.open("rb") as file:
+        while rest := file.read(2**10):  # a piece of zeros unpacks to ten thousand times its size
+            while rest:
+                unpacking = begin() if unpacking.eof else unpacking
+                yield unpacking.decompress(rest)
+                rest = unpacking.unused_data if unpacking.eof else b""
+    if not unpacking.eof:
+        raise EOFError("it is truncated")
+
+
+def _unpack_by(kind: type[gzip.GzipFile | bz2.BZ2File | lzma.LZMAFile]) -> Callable[[Path], Iterator[bytes]]:
+    def unpack(path: Path) -> Iterator[bytes]:
+        with kind(path) as file:
+            while piece := file.read(_COPY_BYTES):
+                yield piece
+
+    return unpack
+
+
+# How files are packed, by their first bytes.
+_PACKINGS: Mapping[bytes, Callable[[Path], Iterator[bytes]]] = {
+    b"\x1f\x8b": _unpack_by(gzip.GzipFile),
+    b"BZh": _unpack_by(bz2.BZ2File),
+    b"\xfd7zXZ": _unpack_by(lzma.LZMAFile),
+    ZSTD_MAGIC: _unpack_zstd,
+}
+_DAMAGE = (EOFError, ValueError, zlib.error, lzma.LZMAError, zstandard.ZstdError)
+
+
+def is_packed(magic: bytes) -> bool:
+    """Whether a file that begins so is one that `decompress_file` unpacks."""
+    return magic.startswith(tuple(_PACKINGS))
+
+
+def decompress_file(source: Path, target: Path, name: str, accepted_bytes: int | None = None) -> Path:
     """Unpack a file to a target, and return it. Raises RecordingError where it is damaged or implausibly large."""
+    with source.open("rb") as file:
+        magic = file.read(max(map(len, _PACKINGS)))
     size, written = source.stat().st_size, 0
     try:
-        with source.open("rb") as packed, target.open("wb") as plain:
-            for piece in zstandard.ZstdDecompressor().read_to_iter(packed, write_size=_COPY_BYTES):
+        unpack = next(unpack for start, unpack in _PACKINGS.items() if magic.startswith(start))
+        with target.open("wb") as plain:
+            for piece in unpack(source):
                 written += len(piece)
-                require_plausible_inflation(size, written, name)
+                require_plausible_inflation(size, written, name, accepted_bytes)
                 plain.write(piece)
-    except (zstandard.ZstdError, ValueError) as error:
+    except (OSError, StopIteration, *_DAMAGE) as error:
+        if isinstance(error, OSError) and error.errno is not None:  # of the disk; one of the content has no number
+            raise
         raise RecordingError(f"{name}: cannot be decompressed ({error}); copy the file again") from error
     return target

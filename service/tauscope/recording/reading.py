@@ -1,9 +1,11 @@
 """Read a recording, whatever its format, or tell which of its columns is read as which."""
 
 import errno
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from pydantic import Field
 
@@ -11,6 +13,7 @@ from tauscope.errors import RecordingError
 from tauscope.recording import array_files, column_files
 from tauscope.recording.columns import is_column, require_joint_count
 from tauscope.recording.csv_format import read_csv, read_csv_header
+from tauscope.recording.inflation import HELD_BYTES, decompress_file, is_packed
 from tauscope.recording.intake import Choice
 from tauscope.recording.joint_state_topic import JointStateLog
 from tauscope.recording.layout.guess import guess_parts
@@ -53,10 +56,6 @@ _FOLDER = _Format(b"", add_log=add_rosbag2, reads_ranges=True)
 _LONGEST_PATH = 4096
 _MAGIC_BYTES = 16
 _FOREIGN = (
-    (b"\x1f\x8b", "is compressed by gzip; unpack it first"),
-    (b"\x28\xb5\x2f\xfd", "is compressed by zstd; unpack it first"),
-    (b"BZh", "is compressed by bzip2; unpack it first"),
-    (b"\xfd7zXZ", "is compressed by xz; unpack it first"),
     (b"\x89HDF", "is an HDF5 file; export it as CSV or Parquet"),
     (b"MATLAB 7.3", "is a MATLAB file of version 7.3; save it by save(..., '-v7')"),
     (b"\x93NUMPY", "is one NumPy array; save time, positions and torques by np.savez"),
@@ -83,7 +82,8 @@ def read_recording(
         with name_failures(path):
             packed_bytes = sum(file.stat().st_size for file in (path.iterdir() if is_folder(path) else [path]))
             choice = Choice(name, joint_count, names, reading=reading, packed_bytes=packed_bytes)
-            recording = _read(path, choice)
+            with _unpack(path, name) as plain:
+                recording = _read(plain, choice)
     except OSError as error:
         raise RecordingError(f"{name}: {_reason(error)}") from error
     require_joint_count(recording.joint_count, joint_count, name)
@@ -98,10 +98,11 @@ def read_header(path: Path) -> list[str]:
         if not isinstance(path, Path):
             with name_failures(path), copy_locally(path) as copy:
                 return read_header(copy)
-        found = _find_format(path, name)
-        if found.read_header is None:
-            raise RecordingError(f"{name}: a log names its joints itself; choose a topic with --topic")
-        return found.read_header(path, name)
+        with _unpack(path, name) as plain:
+            found = _find_format(plain, name)
+            if found.read_header is None:
+                raise RecordingError(f"{name}: a log names its joints itself; choose a topic with --topic")
+            return found.read_header(plain, name)
     except OSError as error:
         raise RecordingError(f"{name}: {_reason(error)}") from error
 
@@ -114,6 +115,16 @@ def first_bytes(path: Path, name: str) -> bytes:
         raise RecordingError(f"{name}: not a regular file; save the data to a file first")
     with open_ranges(path) as file:
         return file.read(_MAGIC_BYTES)
+
+
+@contextmanager
+def _unpack(path: Path, name: str) -> Iterator[Path]:
+    """The path itself, or what is in a packed file, unpacked: ``log.csv.gz``."""
+    if is_folder(path) or not is_packed(first_bytes(path, name)):
+        yield path
+        return
+    with copy_locally(path) as packed, TemporaryDirectory(prefix="tauscope-") as folder:
+        yield decompress_file(packed, Path(folder) / path.stem, name, HELD_BYTES)
 
 
 def _read(path: Path, choice: Choice) -> Recording:
@@ -137,6 +148,8 @@ def _find_format(path: Path, name: str) -> _Format:
     for each in _FORMATS:
         if magic.startswith(each.magic):
             return each
+    if is_packed(magic):
+        raise RecordingError(f"{name}: is compressed twice; unpack it first")
     for start, words in _FOREIGN:
         if magic.startswith(start):
             raise RecordingError(f"{name}: {words}")
