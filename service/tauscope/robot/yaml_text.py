@@ -15,7 +15,7 @@ from tauscope.errors import RobotFileError
 from tauscope.robot.messages import shown
 
 DEEPEST = 24
-MOST_ENTRIES = 20_000
+MOST_ENTRIES = 10_000
 TAG = "tag:yaml.org,2002:"
 TRUE = frozenset({"true", "yes", "on", "y"})
 FALSE = frozenset({"false", "no", "off", "n"})

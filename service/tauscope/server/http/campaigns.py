@@ -163,14 +163,16 @@ CAMPAIGNS = Campaigns(
 )
 
 router = CAMPAIGNS.router()
-_MOTION_PROBLEMS = ("robot-file", "excitation", "scenario", "acquisition", "recording", "identification")
+_WORK_PROBLEMS = dict.fromkeys(
+    ("excitation", "scenario", "acquisition", *IDENTIFICATIONS.work_problems, *DIAGNOSES.work_problems)
+)
 
 
 @router.get(
     "/{identifier}/result",
     name="get_result_of_campaigns",
     summary="Fetch the result",
-    responses=problem_responses("not-found", *answers.ENDINGS, *_MOTION_PROBLEMS, "worker-lost", "internal"),
+    responses=problem_responses("not-found", *answers.ENDINGS, *_WORK_PROBLEMS, "worker-lost", "internal"),
 )
 def get_result(identifier: answers.Identifier, services: ServicesDep) -> CampaignResult:
     """The identified model, and everything that led to it; else the problem that the campaign ended in."""

@@ -45,7 +45,7 @@ Name = Annotated[str, Path(description="name of the recording", examples=["log-2
 JointCount = Annotated[int | None, Query(gt=0, le=1000, description="joints that the recording must have")]
 MostSamples = Annotated[int, Query(ge=2, le=1_000_000, description="samples to return, about")]
 RecordingLimit = Annotated[int, Query(ge=1, le=10_000, description="most entries of the list")]
-_BODY = form_body({"file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database")}, required=["file"])
+_BODY = form_body({"file": binary_part("the recording: CSV, Parquet, NumPy, MATLAB, JSON, MCAP or a bag")}, required=["file"])
 
 
 @router.post(
@@ -148,7 +148,7 @@ mapping_router = APIRouter(prefix="/mappings", tags=["recordings"], responses=pr
 
 _MAPPING_BODY = form_body(
     {
-        "file": binary_part("the recording: CSV, Parquet, MCAP or a rosbag2 database"),
+        "file": binary_part("the recording: CSV, Parquet, NumPy, MATLAB, JSON, MCAP or a bag"),
         **ROBOT_PARTS,
         "request": refer_to_model(ReadingRequest),
     },
