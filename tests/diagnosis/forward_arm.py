@@ -54,6 +54,7 @@ def _play(setpoints: Array, entry: dict[str, Any]) -> list[tuple[Array, Array, A
         arm.exchange(Setpoint(setpoint, np.zeros(len(setpoint))))
         mechanism = arm.device._mechanism
         true = mechanism.true
-        rows.append((true.motor_position, true.link_position, mechanism._sample.torque, true.temperature))
+        *_, torque = mechanism._sample
+        rows.append((true.motor_position, true.link_position, torque, true.temperature))
         arm.clock.wait_until_ns((number + 1) * step_ns)
     return rows
