@@ -45,7 +45,8 @@ Name = Annotated[str, Path(description="name of the recording", examples=["log-2
 JointCount = Annotated[int | None, Query(gt=0, le=1000, description="joints that the recording must have")]
 MostSamples = Annotated[int, Query(ge=2, le=1_000_000, description="samples to return, about")]
 RecordingLimit = Annotated[int, Query(ge=1, le=10_000, description="most entries of the list")]
-_BODY = form_body({"file": binary_part("the recording: CSV, Parquet, NumPy, MATLAB, JSON, MCAP or a bag")}, required=["file"])
+_FILE = binary_part("the recording: CSV, Parquet, NumPy, MATLAB, JSON, MCAP or a bag")
+_BODY = form_body({"file": _FILE}, required=["file"])
 
 
 @router.post(
@@ -148,7 +149,7 @@ mapping_router = APIRouter(prefix="/mappings", tags=["recordings"], responses=pr
 
 _MAPPING_BODY = form_body(
     {
-        "file": binary_part("the recording: CSV, Parquet, NumPy, MATLAB, JSON, MCAP or a bag"),
+        "file": _FILE,
         **ROBOT_PARTS,
         "request": refer_to_model(ReadingRequest),
     },
