@@ -25,7 +25,7 @@ ZIP_MAGIC, MATLAB_MAGIC = b"PK\x03\x04", b"MATLAB 5.0"
 JSON_START = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:\[\s*)?\{")  # an object, or a list of them
 
 _MOST_COLUMNS = 10_000
-_LARGEST_JSON_BYTES = 2**28  # its numbers take six times its size in memory
+_LARGEST_JSON_BYTES = 2**28  # a short number takes eight times its text in memory
 _NAMES = ("name", "names", "joint_names")  # what messages call the list of joints that the others follow
 _COMPRESSED = 15  # type of an element of a MATLAB file
 _MATLAB_HEADER_BYTES = 128
@@ -150,7 +150,7 @@ def _read_json(path: Path, name: str) -> dict[str, Array]:
     records = next((value for value in lists.values() if isinstance(value[0], dict)), None)
     if records is not None:
         return _join_records(records, path, name)
-    return _join_arrays({key: array for key, value in lists.items() if (array := _array_of(value)) is not None}, name)
+    return _join_arrays({key: array for key, value in lists.items() if (array := _make_array(value)) is not None}, name)
 
 
 def _parse_json(text: bytes, name: str) -> Any:
@@ -167,7 +167,7 @@ def _parse_json(text: bytes, name: str) -> Any:
     return records if others else records[0]
 
 
-def _array_of(value: Any) -> Array | None:
+def _make_array(value: Any) -> Array | None:
     try:
         return np.array(value, dtype=np.float64)
     except (ValueError, TypeError):  # texts, or lists of different lengths

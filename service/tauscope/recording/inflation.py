@@ -100,14 +100,16 @@ def decompress_file(source: Path, target: Path, name: str, accepted_bytes: int |
     with source.open("rb") as file:
         magic = file.read(max(map(len, _PACKINGS)))
     size, written = source.stat().st_size, 0
+    unpack = next((unpack for start, unpack in _PACKINGS.items() if magic.startswith(start)), None)
+    if unpack is None:
+        raise RecordingError(f"{name}: cannot be decompressed (it is not packed as its name says); copy the file again")
     try:
-        unpack = next(unpack for start, unpack in _PACKINGS.items() if magic.startswith(start))
         with target.open("wb") as plain:
             for piece in unpack(source):
                 written += len(piece)
                 require_plausible_inflation(size, written, name, accepted_bytes)
                 plain.write(piece)
-    except (OSError, StopIteration, *_DAMAGE) as error:
+    except (OSError, *_DAMAGE) as error:
         if isinstance(error, OSError) and error.errno is not None:  # of the disk; one of the content has no number
             raise
         raise RecordingError(f"{name}: cannot be decompressed ({error}); copy the file again") from error

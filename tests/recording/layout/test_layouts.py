@@ -15,6 +15,7 @@ from recording.layout_files import JOINTS, QD, TAU, TIME, Q, guess_of, read, wri
 from recording.recording_files import message_of, rows_of
 from tauscope.errors import RecordingError, RobotFileError
 from tauscope.recording import Reading, read_recording
+from tauscope.recording.layout.guess import guess_layout
 from tauscope.robot import RecordingLayout, layout_from_dict, read_layout
 
 STYLES = {
@@ -321,6 +322,18 @@ def test_columns_that_only_their_unit_tells(tmp_path: Path) -> None:
     samples = read(path, layout, JOINTS).samples()
     assert np.allclose(samples.position, Q)
     assert np.array_equal(samples.effort, TAU)
+
+
+def test_words_go_before_units() -> None:
+    header = [
+        "t",
+        *(f"q{k}" for k in (1, 2)),
+        *(f"X{k} [Nm]" for k in (1, 2)),
+        *(f"predicted torque {k}" for k in (1, 2)),
+    ]
+    layout = guess_layout(header, ("a", "b"))
+    assert layout is not None
+    assert layout.columns == {"t": "t", "q": "q{1}", "tau": "predicted torque {1}"}
 
 
 @pytest.mark.parametrize("has_joints", [True, False])

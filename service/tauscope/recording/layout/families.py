@@ -108,7 +108,7 @@ def words_of(text: str) -> tuple[str, ...]:
 
 def find_families(header: Sequence[str], joint_names: Sequence[str] | None) -> list[Family]:
     """Families of a header: named by the robot's joints, numbered, or named by any word; one joint has no number."""
-    repeated = _find_repeated(header)
+    repeated = _find_repeated_families(header)
     header = [name for name in header if len(name) <= LONGEST_NAME]
     named = _find_named_families(header, joint_names or ())
     has_one = joint_names is None or len(joint_names) == 1
@@ -129,7 +129,7 @@ def names_in(header: Sequence[str], template: str) -> list[str]:
     return [match[1] for match in map(pattern.fullmatch, header) if match]
 
 
-def _find_repeated(header: Sequence[str]) -> list[Family]:
+def _find_repeated_families(header: Sequence[str]) -> list[Family]:
     """Families whose columns all have one name."""
     places: dict[str, list[int]] = {}
     for place, name in enumerate(header, 1):

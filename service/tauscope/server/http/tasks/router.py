@@ -352,6 +352,8 @@ def _lease_header(_lease: LeaseToken = None) -> None:
 
 
 def _read_files(folder: Path) -> list[RobotFileAnswer]:
-    paths = [path for path in sorted(folder.iterdir()) if path.is_file() and not path.is_symlink()]
-    texts = [path.read_bytes().decode("utf-8", errors="replace") for path in paths]
-    return [RobotFileAnswer(name=path.name, content=text) for path, text in zip(paths, texts, strict=True)]
+    return [
+        RobotFileAnswer(name=path.name, content=path.read_bytes().decode("utf-8", errors="replace"))
+        for path in sorted(folder.iterdir())
+        if path.is_file() and not path.is_symlink()
+    ]
