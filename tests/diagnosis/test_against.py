@@ -90,6 +90,14 @@ def test_against_a_right_model_nothing_is_wrong() -> None:
     assert found.fit.train.rms_before == pytest.approx(noise, rel=0.25)
 
 
+def test_exact_recordings_of_a_simulation_are_consistent() -> None:
+    """Rounding is no noise: by that, an offset of 1e-9 Nm would be certain."""
+    with only_effects(["joint_spring", "cogging"]):
+        found = document(diagnose(paper_robot(), simulated(paper_robot())))
+    assert found.verdict == "consistent"
+    assert not found.findings
+
+
 def test_a_robot_without_a_model_is_refused_by_name() -> None:
     with pytest.raises(IdentificationError, match="no model block"):
         against_model(_with_model(replace(paper_robot(), model=Model(None, None))))

@@ -1,4 +1,4 @@
-"""The fit of everything at once: its columns are the slopes of what it leaves."""
+"""The columns of an extended model are the slopes of what it leaves."""
 
 from dataclasses import replace
 
@@ -65,50 +65,3 @@ def test_what_k_v_changes_of_an_effect_is_its_own_slope(diagnosis: Diagnosis) ->
     exact = SIZE * 2.0 / np.pi * k_v * v / (1.0 + (k_v * v) ** 2) * np.exp(-np.abs(v) / SPEED)
     found = with_terms(model, [term]).step_sensitivity(term, signals)
     np.testing.assert_allclose(found[0], exact, atol=1e-3 * SIZE)
-
-
-@pytest.mark.parametrize(("speed", "size"), [(0.05, 0.5), (0.9, -1.0)])
-def test_a_fit_ends_where_nothing_is_left_to_gain(diagnosis: Diagnosis, speed: float, size: float) -> None:
-    """From either side of where a curve belongs, with friction that has first to find its own size and slopes."""
-    nominal, fitter = diagnosis.selection.nominal.model, diagnosis.fitter
-    far = replace(curve(diagnosis), shape=np.array([speed, 1.0]), coefficients=np.array([size]))
-    found = fitter.fit(with_terms(nominal, [far]))
-    assert found.energy - found.projection.energy < 0.1
-    assert found.energy - fitter.fit(found.model).energy < 0.1
-
-
-def test_energy_is_what_the_model_leaves_and_not_what_a_step_promises(diagnosis: Diagnosis) -> None:
-    fitter = diagnosis.fitter
-    begun = fitter.fit(with_terms(diagnosis.selection.nominal.model, [curve(diagnosis)]))
-    left = sum(float(rows @ rows) for rows in fitter.white_residual(begun.model))
-    _, of_prior = begun.model.prior()
-    assert begun.energy == pytest.approx(left + float(of_prior @ of_prior), rel=1e-9)
-
-
-def test_a_constant_at_its_limit_promises_nothing(diagnosis: Diagnosis) -> None:
-    """What a slope beyond three times its start would explain is nothing that the model can."""
-    nominal, fitter = diagnosis.selection.nominal.model, diagnosis.fitter
-    place = nominal.constants.index((JOINT, "k_v"))
-    terms = list(nominal.structure.terms)
-    terms[JOINT] = replace(terms[JOINT], k_v=nominal.constant(place) / 20.0)
-    unstated = tuple(None if at == place else stated for at, stated in enumerate(nominal.stated))
-    flat = replace(nominal, structure=nominal.structure.with_terms(tuple(terms)), stated=unstated)
-    found = fitter.fit(flat)
-    assert found.model.constant(place) == pytest.approx(3.0 * flat.constant(place))
-    assert found.projection.step[nominal.structure.size + place] == pytest.approx(0.0, abs=1e-9)
-    assert found.energy == pytest.approx(found.projection.energy, abs=0.1)
-
-
-def test_a_shape_at_its_bound_promises_nothing_and_is_not_known(diagnosis: Diagnosis) -> None:
-    """A power of speed near one comes as near to a curve that falls with speed as its bound allows."""
-    nominal, fitter = diagnosis.selection.nominal.model, diagnosis.fitter
-    powers = [
-        each for each in possible_effects(diagnosis.setting) if (each.id, each.joint) == ("nonlinear_viscous", JOINT)
-    ]
-    power = max(powers, key=lambda each: float(each.lower[0]))
-    found = fitter.fit(with_terms(nominal, [Term(power, np.array([1.3]), np.array([1.0]))]))
-    assert found.model.terms[0].shape == power.lower
-    place = found.model.term_places()[0].stop - 1
-    assert found.projection.step[place] == 0.0
-    assert found.energy == pytest.approx(found.projection.energy, abs=0.1)
-    assert found.covariance[place, place] > 0.0

@@ -57,6 +57,6 @@ def test_a_wave_in_time_is_told_from_noise() -> None:
     assert known is not None
     for (unweighted, model), is_there in ((waving, True), (quiet, False)):
         rows = unweighted.with_noise(known.noise)
-        left = lack_of_fit(Fitter(rows).fit(model), rows, pure_error=True)
+        left = lack_of_fit(Fitter(rows).projected(model), rows, pure_error=True)
         assert ((left.omnibus < 1e-6) == is_there).all()
         assert ((left.omnibus > 1e-3) != is_there).all()

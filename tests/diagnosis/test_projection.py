@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tauscope.diagnosis.findings.detectability import effective_number
-from tauscope.diagnosis.fitting.projection import JointColumns, Moments, fitted_parameters, moments, project
+from tauscope.diagnosis.fitting.projection import JointColumns, Moments, moments, project
 
 Array = NDArray[np.float64]
 
@@ -48,17 +48,6 @@ def test_the_projection_is_the_dense_least_squares_fit() -> None:
     assert fitted.step == pytest.approx(np.linalg.lstsq(dense, target)[0])
     assert fitted.energy == pytest.approx(energy(dense, target))
     assert fitted.spread @ fitted.spread.T == pytest.approx(np.linalg.inv(dense.T @ dense))
-
-
-@pytest.mark.parametrize("twice", [False, True])
-def test_the_parameters_alone_are_those_of_the_projection(twice: bool) -> None:
-    """Also where a column is there twice: of all that fit as well, both are the smallest."""
-    rng = np.random.default_rng(5)
-    columns, _, size = design(rng)
-    if twice:
-        columns[1].rows[4] = columns[1].rows[3]
-    target = split(rng.standard_normal(sum(ROWS)))
-    assert fitted_parameters(columns, target, size) == pytest.approx(project(columns, target, size).step, rel=1e-9)
 
 
 @pytest.mark.parametrize("touched", [(0,), (1,), (0, 1)])

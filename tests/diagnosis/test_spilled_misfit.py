@@ -42,7 +42,7 @@ def test_what_the_fit_spreads_is_told_of_the_joint_that_is_wrong() -> None:
     rows = with_pure_error(found.fitter.observations, model)
     assert rows is not None
     fitter = Fitter(rows.with_weightings(weightings_of_motion(rows, model)))
-    fit = fitter.fit(model)
+    fit = fitter.projected(model)
     plain = lack_of_fit(fit, fitter.observations, pure_error=True)
     assert plain.significant == [True, True, True]
     assert without_spilled(plain, fit, fitter, pure_error=True).significant == [False, True, False]

@@ -88,3 +88,12 @@ def test_another_unit_of_mass_changes_nothing_but_the_unit() -> None:
     about, in_grams = own.about(bodies), heavier.about(1000.0 * bodies)
     np.testing.assert_allclose(in_grams.mean, 1000.0 * about.mean, rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(in_grams.precision, about.precision / 1e6, rtol=1e-6, atol=1e-12)
+
+
+@given(SEEDS)
+def test_a_body_that_grows_thinner_and_thinner_ends_where_double_numbers_do(seed: int) -> None:
+    own, _, bodies = prior(seed)
+    step = np.abs(bodies).max() * np.random.default_rng([seed, 2]).standard_normal(len(bodies))
+    for _ in range(40):
+        bodies = bodies + own.share(bodies, step) * step
+    assert all(np.linalg.eigvalsh(pseudo_inertia(each))[0] > 0.0 for each in bodies.reshape(-1, 10))

@@ -11,8 +11,7 @@ from diagnosis.evidence.test_linear_model import problem
 from diagnosis.nominal_arm import identify_arm, nominal_rows
 from tauscope.diagnosis.evidence.linear_model import LinearModel
 from tauscope.diagnosis.evidence.rows import EvidenceRows
-from tauscope.diagnosis.fitting.fit import stepped
-from tauscope.diagnosis.model.extended import with_terms
+from tauscope.diagnosis.model.extended import stepped, with_terms
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.search import hypothesis
 from tauscope.diagnosis.search.hypothesis import Laboratory, Prior

@@ -45,11 +45,11 @@ def fit_to_simulation(diagnosis: Diagnosis, simulated: Sequence[Recording], opti
     rows = Observations.prepare(conditioners, diagnosis.robot, base, cutoff, start.steepness)
     repeated = with_pure_error(rows, start)
     rows = repeated or rows.with_noise(_quieter_noise(rows, start))
-    fit = Fitter(rows.with_weightings(weightings_of_motion(rows, start))).fit(start)
+    fit = Fitter(rows.with_weightings(weightings_of_motion(rows, start))).projected(start)
     inflation = 1.0 if repeated else fit.inflation()
     size = start.structure.size
     covariance = fit.covariance[:size, :size] * inflation
-    return SimulatedFit(fit.model.parameters, covariance, _shared(diagnosis, fit, inflation))
+    return SimulatedFit(fit.free_parameters, covariance, _shared(diagnosis, fit, inflation))
 
 
 def _quieter_noise(rows: Observations, start: ExtendedModel) -> list[JointNoise]:
@@ -63,7 +63,10 @@ def _in_columns_of(final: ExtendedModel, simulated: ExtendedModel, terms: Sequen
     """The simulator's model in the columns of the final one: terms that it has not begin at zero."""
     known = dict(zip(simulated.structure.names, simulated.parameters, strict=True))
     parameters = np.array([known.get(name, 0.0) for name in final.structure.names])
-    kept = replace(final, parameters=parameters, stated=(None,) * len(final.constants))
+    pairs = zip(final.structure.terms, simulated.structure.terms, strict=True)
+    own = [replace(real, k_v=found.k_v, delta=real.delta and (found.delta or real.delta)) for real, found in pairs]
+    structure = final.structure.with_terms(tuple(own))
+    kept = replace(final, structure=structure, parameters=parameters, stated=(None,) * len(final.constants))
     return with_terms(kept, terms)
 
 
@@ -77,15 +80,16 @@ def _shared(diagnosis: Diagnosis, fit: Fit, inflation: float) -> dict[Place, tup
     simulated = zip(fit.model.terms, fit.model.term_places(), strict=True)
     for (term, place), (own, at) in zip(lasting, simulated, strict=True):
         count = len(own.coefficients)
+        coefficients = own.coefficients + fit.projection.step[at][:count]
         spread = fit.covariance[at, at][:count, :count] * inflation
-        strength = float(own.coefficients @ np.linalg.pinv(spread, hermitian=True) @ own.coefficients)
-        of_real = float(np.linalg.norm(own.coefficients) / max(np.linalg.norm(term.coefficients), 1e-300))
+        strength = float(coefficients @ np.linalg.pinv(spread, hermitian=True) @ coefficients)
+        of_real = float(np.linalg.norm(coefficients) / max(np.linalg.norm(term.coefficients), 1e-300))
         if strength > PRESENT**2 and of_real > OF_REAL:
             errors = np.diag(spread) + np.diag(real.covariance[place, place])[:count] * diagnosis.inflation
             differences = tuple(
                 ParameterDifference(
                     f"{coefficient.name} of {term.effect.name(names)}",
-                    float(own.coefficients[number]),
+                    float(coefficients[number]),
                     float(term.coefficients[number]),
                     float(np.sqrt(errors[number])),
                 )

@@ -93,7 +93,10 @@ class BodyPrior:
         """Part of a step of links, (10 n,) each, that leaves every one its volume, at most 1."""
         share = 1.0
         for own in _each(links):
-            root = cholesky(pseudo_inertia(links[own] - THINNEST * self.mean[own]), lower=True)
+            room = pseudo_inertia(links[own] - THINNEST * self.mean[own])
+            if np.linalg.eigvalsh(room)[0] <= np.finfo(float).eps * np.trace(room):
+                return 0.0  # as thin as may be
+            root = cholesky(room, lower=True)
             half = solve_triangular(root, pseudo_inertia(step[own]), lower=True)
             least = float(np.linalg.eigvalsh(solve_triangular(root, half.T, lower=True))[0])
             share = min(share, -WITHIN / least) if least < 0.0 else share

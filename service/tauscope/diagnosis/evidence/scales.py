@@ -1,6 +1,6 @@
 """Sizes of what is not known at a joint: torque noise, discrepancy of each kind, friction near rest."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,17 +25,22 @@ class Scales:
     values: Array  # (2 + G,), log σ, log a_g of every group, log r; in units of white noise
     level: float  # rms of what the plain model leaves, white
     noise_spread: float = NOISE_SPREAD  # standard deviation of log σ about the noise that was estimated before
+    finest: float = -LIMIT  # least log σ
 
     @staticmethod
-    def start(level: float, *, repeated: bool = False) -> "Scales":
-        """Noise as it was estimated, or as repetitions tell it, and a discrepancy of a tenth of what is left."""
+    def start(level: float, *, repeated: bool = False, finest: float = 0.0) -> "Scales":
+        """Noise as it was estimated, or as repetitions tell it, and a discrepancy of a tenth of what is left.
+
+        `finest`: least σ, in units of white noise.
+        """
         values = np.array([0.0, *[np.log(0.1 * level)] * GROUPS, REST])
-        return Scales(values, level, REPEATED_SPREAD if repeated else NOISE_SPREAD)
+        least = max(float(np.log(max(finest, np.finfo(float).tiny))), -LIMIT)
+        return Scales(values, level, REPEATED_SPREAD if repeated else NOISE_SPREAD, least)
 
     def bounds(self) -> list[tuple[float, float]]:
         """Range of each logarithm."""
         least = float(np.log(LEAST * self.level))
-        return [(-LIMIT, LIMIT), *[(least, least + LIMIT)] * GROUPS, (-LIMIT, LIMIT)]
+        return [(self.finest, LIMIT), *[(least, least + LIMIT)] * GROUPS, (-LIMIT, LIMIT)]
 
     @property
     def noise(self) -> float:
@@ -71,5 +76,5 @@ class Scales:
     def without_discrepancy(self, noise: float) -> "Scales":
         """The same with no discrepancy and another noise. `noise`: σ."""
         values = self.values.copy()
-        values[0], values[1:-1] = np.log(noise), np.log(LEAST * self.level)
-        return Scales(values, self.level, self.noise_spread)
+        values[0], values[1:-1] = max(np.log(noise), self.finest), np.log(LEAST * self.level)
+        return replace(self, values=values)

@@ -122,11 +122,10 @@ def effective_number(found: Moments, columns: Mapping[int, Array], rng: np.rando
     """
     shapes, count = found.target.shape
     inner = found.inner.reshape(shapes * count, -1)
-    gram = -inner @ inner.T
-    for own in columns.values():
-        rows = own.reshape(shapes * count, -1)
-        gram += rows @ rows.T
-    scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+    raw = sum(own.reshape(shapes * count, -1) @ own.reshape(shapes * count, -1).T for own in columns.values())
+    gram = raw - inner @ inner.T
+    # What is invisible is nothing but rounding: by its own size it would be noise as large as any.
+    scale = np.sqrt(np.maximum(np.diag(gram), INVISIBLE * np.diag(raw) + np.finfo(float).tiny))
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     known = values > 1e-9 * values[-1]
     draws = (vectors[:, known] * np.sqrt(values[known])) @ rng.standard_normal((int(known.sum()), DRAWS))

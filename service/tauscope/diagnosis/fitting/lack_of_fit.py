@@ -175,7 +175,7 @@ def without_spilled(misfit: LackOfFit, fit: Fit, fitter: Fitter, *, pure_error: 
     while suspects:
         wrong.add(max(suspects, key=lambda joint: apart.excess[joint]))
         rows = fitter.observations.without_joints(wrong)
-        apart = lack_of_fit(Fitter(rows).fit(fit.model), rows, pure_error=pure_error)
+        apart = lack_of_fit(Fitter(rows).projected(fit.model), rows, pure_error=pure_error)
         suspects = (_significant(apart) & _significant(misfit)) - wrong
     spilled = np.isin(np.arange(len(misfit.excess)), list(_significant(misfit) - wrong))
     tests = ("omnibus", "pure_error", "excess")

@@ -82,15 +82,6 @@ def project(
     return Projection(spread, basis, residual, spread @ inner, float(left @ left))
 
 
-def fitted_parameters(columns: Sequence[JointColumns], target: Sequence[Array], size: int) -> Array:
-    """The fitted parameters alone, (p,), of `target`, (R_j,) a joint: a fraction of the cost of `project`."""
-    spread = _spread(columns, np.zeros((0, size)))
-    inner = np.zeros(size)
-    for own, y in zip(columns, target, strict=True):
-        inner[own.index] += own.rows @ y
-    return np.asarray(spread @ (spread.T @ inner))
-
-
 def _spread(columns: Sequence[JointColumns], known_rows: Array) -> Array:
     """S with S Sᵀ = (WᵀW)⁺, (p, r), of columns and of rows (s, p) of what is known beforehand."""
     blocks = [known_rows]

@@ -51,26 +51,23 @@ class WhiteColumns:
             found -= term.coefficients @ self._white_term(model, term)[joint]
         return np.asarray(found)
 
-    def linear(self, model: ExtendedModel) -> list[JointColumns]:
-        """Columns of the parameters in which a model is linear, Θ and the terms' coefficients, a joint each."""
-        return [_join(*self._linear(model, joint)) for joint in self._joints]
-
     def all(self, model: ExtendedModel) -> list[JointColumns]:
         """Columns of all parameters, a joint each: slopes of the model's torque."""
         return [self.all_at(model, joint) for joint in self._joints]
 
     def all_at(self, model: ExtendedModel, joint: int) -> JointColumns:
         """Columns of all parameters at one joint."""
-        index, rows = self._linear(model, joint)
-        places, amplitudes = model.slope_amplitudes(joint)
-        slopes = self._scale(model, joint) * amplitudes[:, None] * self._white_friction_slopes(model, joint)
-        index += places
+        factor, (places, amplitudes) = self._scale(model, joint), model.slope_amplitudes(joint)
+        slopes = factor * amplitudes[:, None] * self._white_friction_slopes(model, joint)
+        index = [*map(int, model.structure.joint_columns(joint)), *places]
+        rows = [factor * self._white_rigid(joint), factor * self._white_friction(model, joint)]
         rows.append(slopes + self._of_steps(model, joint, places))
         for term, place in self._terms_at(model, joint):
+            index += range(place.start, place.stop)
+            rows.append(self._white_term(model, term)[joint])
             if term.free_shapes:
-                index += range(place.start + len(term.coefficients), place.stop)
                 rows.append(term.coefficients @ self._white_shape_slopes(model, term)[joint])
-        return _join(index, rows)
+        return JointColumns(np.array(index, dtype=np.intp), np.concatenate(rows))
 
     def key(self, model: ExtendedModel, joint: int) -> tuple[object, ...]:
         """All that the residual and the columns of a joint depend on."""
@@ -86,16 +83,6 @@ class WhiteColumns:
         """Terms that touch a joint, and where their parameters stand."""
         terms = zip(model.terms, model.term_places(), strict=True)
         return [each for each in terms if joint in each[0].effect.touched(len(self._joints))]
-
-    def _linear(self, model: ExtendedModel, joint: int) -> tuple[list[int], list[Array]]:
-        """Places and columns of Θ and of the terms' coefficients at a joint."""
-        factor = self._scale(model, joint)
-        index = [int(place) for place in model.structure.joint_columns(joint)]
-        rows = [factor * self._white_rigid(joint), factor * self._white_friction(model, joint)]
-        for term, place in self._terms_at(model, joint):
-            rows.append(self._white_term(model, term)[joint])
-            index += range(place.start, place.start + len(rows[-1]))
-        return index, rows
 
     def _scale(self, model: ExtendedModel, joint: int) -> Array | float:
         """∂τ_recorded/∂τ of every row, (R,), or of all; whitening mixes neighbours, for which it is nearly the same."""
@@ -207,11 +194,6 @@ def _key(model: ExtendedModel, term: Term) -> tuple[object, ...]:
     takes that.
     """
     return id(term.effect), term.shape.tobytes(), _beside(model, term)
-
-
-def _join(index: Sequence[int], rows: Sequence[Array]) -> JointColumns:
-    """Columns of a joint and their places among all parameters."""
-    return JointColumns(np.array(index, dtype=np.intp), np.concatenate(rows))
 
 
 def white_columns(

@@ -212,3 +212,22 @@ def _with_steepness(signals: Signals, steepness: Array) -> Signals:
 def with_terms(model: ExtendedModel, terms: Sequence[Term]) -> ExtendedModel:
     """The same nominal part with other effects."""
     return replace(model, terms=tuple(terms))
+
+
+def stepped(model: ExtendedModel, step: Array) -> ExtendedModel:
+    """The model moved by a step, (p,), each shape within its bounds and what its coefficients let it be."""
+    size = model.structure.size
+    terms = list(model.structure.terms)
+    for place, (joint, name) in enumerate(model.constants):
+        if step[size + place]:
+            terms[joint] = replace(terms[joint], **{name: model.constant(place) * float(np.exp(step[size + place]))})
+    moved = []
+    for term, place in zip(model.terms, model.term_places(), strict=True):
+        count, effect, shape, free = len(term.coefficients), term.effect, term.shape.copy(), list(term.free_shapes)
+        coefficients = term.coefficients + step[place][:count]
+        shape[free] += step[place][count:]
+        for lower, upper in (effect.limits(coefficients, shape), (effect.lower, effect.upper)):
+            shape[free] = np.clip(shape[free], lower[free], upper[free])
+        moved.append(replace(term, shape=shape, coefficients=coefficients))
+    structure = model.structure.with_terms(tuple(terms))
+    return replace(model, structure=structure, parameters=model.parameters + step[:size], terms=tuple(moved))

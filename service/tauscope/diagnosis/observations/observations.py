@@ -24,6 +24,7 @@ from tauscope.recording.recording import Array
 from tauscope.robot import Robot
 
 BoolArray = NDArray[np.bool_]
+FINEST = 1e-6  # least noise of a joint, relative to its rms torque: no sensor has 20 bits, no simulation needs them
 LEFT_OUT = 100.0  # factor to the noise of a joint that is left out
 
 
@@ -151,8 +152,10 @@ class Observations:
         )
 
     def with_noise(self, noise: Sequence[JointNoise]) -> "Observations":
-        """The same rows with their noise known."""
-        return replace(self, noise=tuple(noise), weightings=(), _kept={})
+        """The same rows with their noise known, which is never finer than sensors and simulations are."""
+        rms = [np.sqrt(np.mean(np.concatenate(self.torque(joint), axis=1) ** 2)) for joint in range(len(noise))]
+        known = tuple(own.at_least(FINEST * float(each)) for own, each in zip(noise, rms, strict=True))
+        return replace(self, noise=known, weightings=(), _kept={})
 
     def with_weightings(self, weightings: Sequence[RowWeighting]) -> "Observations":
         """The same rows, counting as much as they say."""

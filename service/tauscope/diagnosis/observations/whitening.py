@@ -43,6 +43,10 @@ class JointNoise:
         )
         return replace(self, model=model)
 
+    def at_least(self, std: float) -> "JointNoise":
+        """Noise of the same colour, whose standard deviation is not below one."""
+        return self.times(max(1.0, std / float(np.sqrt(self.model.variance))))
+
     def whitened(self, rows: Array) -> Array:
         """Rows (..., T) made white with unit variance, (..., T - p). `rows`: (..., T), consecutive rows, time last."""
         if not self.order:

@@ -11,9 +11,9 @@ from tauscope.diagnosis.evidence.linear_model import LinearModel, Posterior
 from tauscope.diagnosis.evidence.rows import EvidenceRows
 from tauscope.diagnosis.evidence.scales import Scales
 from tauscope.diagnosis.fitting.bounded_step import bounded_step
-from tauscope.diagnosis.fitting.fit import stepped
-from tauscope.diagnosis.model.extended import STATED_ERROR, ExtendedModel, with_terms
+from tauscope.diagnosis.model.extended import STATED_ERROR, ExtendedModel, stepped, with_terms
 from tauscope.diagnosis.model.term import Term
+from tauscope.diagnosis.observations.observations import FINEST
 from tauscope.identification import Identification
 from tauscope.recording.recording import Array
 
@@ -105,7 +105,12 @@ class Laboratory:
         dependence = [1.0] * model.structure.robot.joint_count
         moments = self.rows.moments(nominal, dependence)
         levels = [float(np.sqrt(np.mean(own.rows[0] ** 2))) if own.rows.size else 1.0 for own in moments]
-        at = self.at(nominal, (), tuple(Scales.start(level, repeated=self.repeated) for level in levels), dependence)
+        finest = [FINEST * self.rows.measured_rms(joint, 1.0) for joint in range(len(levels))]
+        scales = [
+            Scales.start(level, repeated=self.repeated, finest=least)
+            for level, least in zip(levels, finest, strict=True)
+        ]
+        at = self.at(nominal, (), scales, dependence)
         return self.settle(self.settle(at, range(len(levels))), range(len(levels)))
 
     def at(
