@@ -16,7 +16,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo page prove test test-slow test-proof test-all bench lint format lock clean
+.PHONY: help venv demo page prove test test-slow test-proof test-all bench lint docs format lock clean
 
 help: ## say what there is
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
@@ -79,6 +79,9 @@ lint: $(INSTALLED) ## style, types and the direction of imports
 	$(BIN)/ruff format --check
 	$(BIN)/pyright
 	$(BIN)/lint-imports --no-cache
+
+docs: $(INSTALLED) ## the documentation site in build/docs/html; a warning or a link that leads nowhere is an error
+	$(BIN)/python -m docs.site build/docs
 
 format: $(INSTALLED) ## put the source into its one format
 	$(BIN)/ruff check --fix

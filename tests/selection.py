@@ -72,6 +72,7 @@ NEEDED: dict[str, tuple[str, ...]] = {
     "README.md": ("tests/docs/test_readme.py",),
     "CHANGELOG.md": (),
     "CONTRIBUTING.md": (),
+    "CITATION.cff": (),
     "LICENSE": (),
 }
 """Path prefix to test files and folders; the longest prefix of a path decides. A quick test is never deselected."""

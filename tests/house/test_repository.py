@@ -8,6 +8,7 @@ from itertools import chain, pairwise
 from pathlib import Path
 
 import pytest
+from ruamel.yaml import YAML
 
 import tauscope.errors
 from shared_data import REPOSITORY
@@ -23,7 +24,10 @@ PACKAGES = [
     "drivers/tauscope_drivers",
     "sim_backend/tauscope_sim",
 ]
-TOP_LEVEL = ["pyproject.toml", "Makefile", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", ".ci/run"]
+TOP_LEVEL = [
+    *("pyproject.toml", "Makefile", ".ci/run"),
+    *("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "CITATION.cff", "LICENSE"),
+]
 
 # Written so that no pattern matches this file itself.
 MACHINE_PATH = re.compile(r"(?<![\w.])/(?:wor[k]|roo[t]|opt/pyp[i])/")
@@ -112,6 +116,13 @@ def test_every_dependency_is_locked(file: str) -> None:
         wanted += [requirement for requirement in groups["dev"] if isinstance(requirement, str)]
     names = {re.split(r"[\[<>=!~; ]", requirement)[0].lower().replace(".", "-") for requirement in wanted}
     assert names <= {name for name, _, _ in locked(file)}, f"{file} is behind pyproject.toml: run `make lock`"
+
+
+def test_the_citation_is_of_this_version() -> None:
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    citation = YAML(typ="safe").load((REPOSITORY / "CITATION.cff").read_text(encoding="utf-8"))
+    assert [citation[key] for key in ("version", "license")] == [project[key] for key in ("version", "license")]
+    assert citation["references"][0]["journal"] == "Acta IMEKO"
 
 
 @pytest.mark.parametrize("package", PACKAGES)
