@@ -10,6 +10,7 @@ from concealed import sets
 from concealed.prove import line
 from concealed.publishing.page import write_page
 from concealed.real import concealed_sets
+from concealed.real.concealed_outcome import UNTOUCHED
 from concealed.real.concealed_sets import concealed_tasks
 from concealed.real.trials import QUICK, REAL
 from concealed.running.kept import Kept, Outcome
@@ -54,7 +55,11 @@ def prove(asked: argparse.Namespace) -> None:
     wanted = sets.tasks(counts, asked.first_seed, state)
     real = sets.real_tasks(list(REAL) if asked.full else QUICK, state)
     concealed = concealed_tasks(concealed_sets.FULL if asked.full else QUICK_CONCEALED, asked.first_seed, state)
-    wanted = sets.long_first([*wanted, *real, *concealed])
+    untouched = [task for task in concealed if task.series == UNTOUCHED]
+    if asked.full and asked.minutes is not None:  # a full set that is cut short is a smaller one of the same mix
+        wanted = [*untouched, *sets.mix(wanted, real, [task for task in concealed if task not in untouched])]
+    else:
+        wanted = sets.long_first([*wanted, *real, *concealed])
     minutes = QUICK_MINUTES if asked.minutes is None and not asked.full else asked.minutes
     until = None if minutes is None else 60.0 * minutes
     with workers(asked.jobs, asked.scheduler) as executor:

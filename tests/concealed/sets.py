@@ -71,8 +71,18 @@ def real_tasks(names: Sequence[str], commit: str) -> list[Task]:
 
 def tasks(counts: dict[str, int], first_seed: int, commit: str) -> list[Task]:
     """All trials of a set, the series mixed evenly: a set that is cut short is a smaller one of the same mix."""
-    places = [((number + 0.5) / count, series, number) for series, count in counts.items() for number in range(count)]
-    return [Task(series, first_seed + number, None, commit, series in COMPARED) for _, series, number in sorted(places)]
+    return mix(
+        *(
+            [Task(series, first_seed + number, None, commit, series in COMPARED) for number in range(count)]
+            for series, count in sorted(counts.items())
+        )
+    )
+
+
+def mix(*groups: Sequence[Task]) -> list[Task]:
+    """All trials of some groups, of each as large a part before any place."""
+    places = [((number + 0.5) / len(group), task) for group in groups for number, task in enumerate(group)]
+    return [task for _, task in sorted(places, key=lambda each: each[0])]
 
 
 def long_first(tasks: Sequence[Task]) -> list[Task]:
