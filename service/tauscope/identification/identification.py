@@ -159,7 +159,7 @@ def identify(
         held = evaluate(unseen, structure, [parameters])[0].fit
         predicted, uncertain = predict(unseen)
         held_excitation = measure_excitation(unseen)
-        beyond = uncertain / np.maximum(held.torque_rms, np.finfo(float).tiny)
+        beyond = np.divide(uncertain, held.torque_rms, out=np.ones(len(uncertain)), where=held.torque_rms > 0.0)
         growth = uncertain / np.maximum(known, np.finfo(float).tiny)
     return Identification(
         robot=robot,

@@ -22,6 +22,7 @@ LENGTH = 1.0 / 1.5  # length over which the torque changes, relative to half the
 # Slope at which the direction turns, at most, relative to the top speed: no corner is sharper than the motion.
 SHARPEST = 20.0
 DIRECTION = 1e-6  # singular values of the scaled columns below this share of the largest are no direction
+STANDING = float(np.finfo(float).eps)  # half range and top speed of a joint that stands, which none has
 GROUP = np.repeat(np.arange(len(FEATURES)), FEATURES)  # kind of each feature
 # Singular values of the features of a kind below this share of the largest are none: a millionth of its power.
 RESOLVED = 1e-3
@@ -42,10 +43,8 @@ class Reach:
         position = np.concatenate([piece.prepared.motion.position for piece in observations])
         speed = np.abs(np.concatenate([piece.prepared.motion.velocity for piece in observations]))
         low, high = position.min(axis=0), position.max(axis=0)
-        least = np.finfo(float).tiny
-        return Reach(
-            (low + high) / 2.0, np.maximum((high - low) / 2.0, least), np.quantile(speed, 0.98, axis=0) + least
-        )
+        half, top = np.maximum((high - low) / 2.0, STANDING), np.quantile(speed, 0.98, axis=0) + STANDING
+        return Reach((low + high) / 2.0, half, top)
 
 
 def smooth_features(
