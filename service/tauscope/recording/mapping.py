@@ -1,5 +1,6 @@
 """How a file's columns are found: by its mapping, a preset or their own names; and what to give where they are not."""
 
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -114,7 +115,7 @@ def suggest_layout(header: Sequence[str], reading: Reading, file: str) -> Record
     guess = guess_layout(header, reading.joint_names, prefers_torque=reading.prefers_torque)
     if guess is None:
         return None
-    units = _units_of_tool(header, reading, guess)
+    units = _units_of_tool(header)
     try:
         layout = find_columns(rename_columns(header, replace(reading, columns=guess.columns), file), file)
     except RecordingError:
@@ -124,14 +125,12 @@ def suggest_layout(header: Sequence[str], reading: Reading, file: str) -> Record
     return replace(guess, units=units)
 
 
-def _units_of_tool(header: Sequence[str], reading: Reading, guess: RecordingLayout) -> Mapping[str, str]:
-    """Units of the preset that reads the same columns, such as LeRobot's degrees."""
-    for name, preset in PRESET_OF.items():
-        if preset.units:
-            layout = guess_layout(header, reading.joint_names, preset=name, prefers_torque=reading.prefers_torque)
-            if layout is not None and layout.columns == guess.columns:
-                return preset.units
-    return {}
+def _units_of_tool(header: Sequence[str]) -> Mapping[str, str]:
+    """Units of the preset whose mark a column has, such as LeRobot's degrees."""
+    marked = (preset for preset in PRESET_OF.values() if preset.mark)
+    return next(
+        (preset.units for preset in marked if any(re.search(f"{preset.mark}(?![A-Za-z])", name) for name in header)), {}
+    )
 
 
 def _require_known_names(header: Sequence[str], reading: Reading, file: str) -> None:

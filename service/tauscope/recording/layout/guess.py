@@ -4,7 +4,15 @@ import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 
-from tauscope.recording.layout.families import Family, find_families, is_silent, role_of, time_rank, words_of
+from tauscope.recording.layout.families import (
+    Family,
+    find_families,
+    is_silent,
+    role_of,
+    source_of,
+    time_rank,
+    words_of,
+)
 from tauscope.recording.layout.presets import PRESET_OF, Preset
 from tauscope.recording.unit_text import find_quantity
 from tauscope.robot.recording_layout import RecordingLayout, Source
@@ -13,6 +21,7 @@ _COMMON_JOINT_COUNTS = (6, 7)
 _PLAIN = re.compile(r"(?!(?:y|n|yes|no|on|off|true|false|null)$)[A-Za-z_][A-Za-z0-9_./-]*", re.IGNORECASE)
 _WHOLE_SECONDS = re.compile(r"(.*[^A-Za-z]|)secs?")
 _BY_UNIT_ALONE = 6  # behind every rank by words
+_EFFORTS = ("tau", "i", "taucmd")
 _OPTIONAL = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt")
 
 # The group that words of a column mean, and how far they are from the first choice.
@@ -54,14 +63,17 @@ def guess_parts(
         families += [(family, found) for family in every if (found := _rank_by_unit(family))]
     time = _find_time(header, None if preset is None else PRESET_OF[preset].columns["t"])
     count = None if joint_names is None else len(joint_names)
-    q = _choose(families, "q", count)
+    efforts = [source_of(family.words) for family, (role, _) in families if role in _EFFORTS]
+    q = _choose(families, "q", count, efforts)
     count = count or (len(q.columns) if q else None)
-    order = ("tau", "taucmd", "i") if prefers_torque else ("tau", "i", "taucmd")
+    order = ("tau", "taucmd", "i") if prefers_torque else _EFFORTS
     if joint_names is None:  # then nothing says which of more columns are the joints'
         families = [(family, found) for family, found in families if len(family.columns) == count]
-    effort = next((role for role in order if _choose(families, role, count)), "tau")
-    groups = {"q": q, "i" if effort == "i" else "tau": _choose(families, effort, count)}
-    groups |= {group: _choose(families, group, count) for group in _OPTIONAL if group != effort}
+    own = [source_of(q.words)] if q else []
+    found = {role: _choose(families, role, count, own) for role in (*order, *_OPTIONAL)}
+    effort = next((role for role in order if found[role]), "tau")
+    groups = {"q": q, "i" if effort == "i" else "tau": found[effort]}
+    groups |= {group: found[group] for group in _OPTIONAL if group != effort}
     columns: dict[str, Source] = {} if time is None else {"t": _add_nanoseconds(header, time)}
     if time is None and header[:1] == [""]:  # the index of a table, as pandas writes it
         columns = {"t": 1}
@@ -143,8 +155,10 @@ def _add_nanoseconds(header: Sequence[str], time: str) -> Source:
     return next(([time, name] for name in names if name in header), time)
 
 
-def _choose(families: Sequence[tuple[Family, tuple[str, int]]], role: str, count: int | None) -> Family | None:
-    """The family of a role: with a column for each joint, of the first rank, with the shortest name."""
+def _choose(
+    families: Sequence[tuple[Family, tuple[str, int]]], role: str, count: int | None, sources: Sequence[frozenset[str]]
+) -> Family | None:
+    """The family of a role: with a column for each joint, of the first rank, a joint's, and as near to `sources`."""
     fit = [
         (family, rank) for family, (found, rank) in families if found == role and len(family.columns) >= (count or 1)
     ]
@@ -152,7 +166,8 @@ def _choose(families: Sequence[tuple[Family, tuple[str, int]]], role: str, count
     def unfitness(entry: tuple[Family, int]) -> tuple[object, ...]:
         family, rank = entry
         size = -len(family.columns) if count is None else len(family.columns) != count
-        return size, rank, family.is_guessed, len(family.template)
+        distance = min((len(source_of(family.words) ^ source) for source in sources), default=0)
+        return size, rank, "joint" not in family.words, family.is_guessed, distance, len(family.template)
 
     return min(fit, key=unfitness, default=(None, 0))[0]
 

@@ -10,10 +10,11 @@ class Preset:
 
     columns: Mapping[str, tuple[str, ...]]
     units: Mapping[str, str]  # as in a robot file
+    mark: str  # a word of its columns that no other tool writes, as a pattern: its units follow
 
 
-def _preset(units: Mapping[str, str] | None = None, **ends: str) -> Preset:
-    return Preset({group: tuple(names.split()) for group, names in ends.items()}, units or {})
+def _preset(units: Mapping[str, str] | None = None, mark: str = "", **ends: str) -> Preset:
+    return Preset({group: tuple(names.split()) for group, names in ends.items()}, units or {}, mark)
 
 
 # By the names of `tauscope.robot.recording_layout.PRESETS`.
@@ -32,6 +33,7 @@ PRESET_OF: Mapping[str, Preset] = {
     "plotjuggler": _preset(t="time timestamp", q="position", qd="velocity", tau="effort torque", i="current"),
     "lerobot": _preset(
         {"q": "deg"},
+        r"observation\.state",
         t="timestamp",
         q="observation_state",
         qref="action",
@@ -46,5 +48,17 @@ PRESET_OF: Mapping[str, Preset] = {
         qref="joint_pos_target joint_position_target joint_position_targets",
         tau="applied_torque applied_torques joint_effort joint_efforts measured_joint_efforts"
         " joint_torque joint_torques dof_force computed_torque",
+    ),
+    "odrive": _preset(
+        {"q": "rev"},
+        "pos_estimate",
+        t="time timestamp t",
+        q="pos_estimate",
+        qd="vel_estimate",
+        tau="torque_estimate",
+        i="iq_measured",
+    ),
+    "moteus": _preset(
+        {"q": "rev"}, "q_A", t="time timestamp t", q="position", qd="velocity", tau="torque", i="q_a q_current"
     ),
 }
