@@ -42,7 +42,8 @@ def find_implausible(recording: Recording, robot: Robot | None = None) -> str | 
     """A column that can hardly be in the stated unit: its name, the evidence, and the option that mends it."""
     sketch, types = Sketch.of(recording), joint_types(recording, robot)
     return (
-        _doubt_velocity(sketch, types)
+        _doubt_effort(sketch)
+        or _doubt_velocity(sketch, types)
         or _doubt_time(sketch)
         or _doubt_angle(sketch, types, robot)
         or find_implausible_torque(recording, sketch, robot)
@@ -54,9 +55,18 @@ def _doubt(column: str, evidence: str, units: str = "") -> str:
     return f"column {column}: {evidence}; {f'read it with --units {units}' if units else 'write it in SI units'}"
 
 
+def _doubt_effort(sketch: Sketch) -> str | None:
+    """Efforts that are the velocities, at every joint: columns of a file without names, say, in another order."""
+    ratios = _slope_ratios(sketch, sketch.effort_at_slope, SAME_RATIO)
+    n = len(ratios)
+    if n < 2 or not (np.abs(ratios - 1.0) < SAME_RATIO).all():
+        return None
+    return f"column tau1: tau1 to tau{n} are the velocities of q1 to q{n}; name the columns of torque by --columns"
+
+
 def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> str | None:
     """Recorded velocity against the positions' own: their ratio is a ratio of units."""
-    ratios = _velocity_ratios(sketch)
+    ratios = _slope_ratios(sketch, sketch.velocity)
     known = np.isfinite(ratios)
     if not known.any():
         return None
@@ -91,20 +101,20 @@ def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> str | None:
     return None
 
 
-def _velocity_ratios(sketch: Sketch) -> np.ndarray:
-    """Δq/Δt over recorded velocity, (n,); NaN where it is no steady ratio."""
+def _slope_ratios(sketch: Sketch, others: np.ndarray | None, steady: float = STEADY_RATIO) -> np.ndarray:
+    """Δq/Δt over other columns, (n,); NaN where it is no steady ratio. `others`: (N, n), of the rows of the slope."""
     ratios = np.full(sketch.position.shape[1], np.nan)
-    if sketch.velocity is None:
+    if others is None:
         return ratios
-    for joint, (slope, velocity) in enumerate(zip(sketch.slope.T, sketch.velocity.T, strict=True)):
-        known = np.isfinite(slope) & np.isfinite(velocity)
+    for joint, (slope, other) in enumerate(zip(sketch.slope.T, others.T, strict=True)):
+        known = np.isfinite(slope) & np.isfinite(other)
         if not known.any():
             continue
-        fast = known & (np.abs(velocity) > FAST_PART * np.percentile(np.abs(velocity[known]), 99.0))
+        fast = known & (np.abs(other) > FAST_PART * np.percentile(np.abs(other[known]), 99.0))
         if fast.sum() < FEWEST_ROWS:
             continue
-        low, middle, high = np.percentile(slope[fast] / velocity[fast], [25, 50, 75])
-        if middle > 0.0 and high - low < STEADY_RATIO * middle:
+        low, middle, high = np.percentile(slope[fast] / other[fast], [25, 50, 75])
+        if middle > 0.0 and high - low < steady * middle:
             ratios[joint] = middle
     return ratios
 
@@ -120,7 +130,7 @@ def _name_foreign_units(time: str, position: str, speed: str) -> list[str]:
 
 def _doubt_time(sketch: Sketch) -> str | None:
     """Rates, and lengths of motions, that no arm's recording has."""
-    ratios = _velocity_ratios(sketch)
+    ratios = _slope_ratios(sketch, sketch.velocity)
     if (np.abs(ratios - 1.0) < AGREEMENT).any():
         return None  # the recorded velocity vouches for the clock
     interval, moving = sketch.interval, (sketch.span > LEAST_SWEEP) & (sketch.top_speed > 0.0)
