@@ -16,6 +16,7 @@ import numpy as np
 from pydantic_core import from_json
 
 from tauscope.errors import RecordingError
+from tauscope.recording.layout.families import is_name_list
 from tauscope.recording.samples import Array
 
 _NUMBER_BYTES = b"0123456789+-.eE \tnaN"
@@ -181,16 +182,17 @@ class Dialect:
         return [field.strip(b' \t\r"') for field in self.normalize(line).split(self.separator)]
 
     def name_fields(self, header: bytes, row: bytes) -> list[bytes]:
-        """Names of a row's fields: a name whose cell is a list stands for its elements, numbered from 0."""
+        """Names of a row's fields: a name whose cell is a list stands for its elements, by joint or numbered from 0."""
         names, cells = self._cells(header), self._cells(row)
         if len(names) != len(cells):
             return [name.strip().encode("latin-1") for name in names]
+        lists = [_TEXT.findall(cell) for name, cell in zip(names, cells, strict=True) if is_name_list(name.strip())]
         found = []
         for name, cell in zip(names, cells, strict=True):
-            text = name.strip().encode("latin-1")
-            elements = range(len(_elements(cell)))
-            found += [b"%s[%d]" % (text, element) for element in elements] if _is_list(cell) else [text]
-        return found
+            text, count = name.strip(), len(_elements(cell))
+            elements = next((joints for joints in lists if len(set(joints)) == count), range(count))
+            found += [f"{text}[{element}]" for element in elements] if _is_list(cell) else [text]
+        return [name.encode("latin-1") for name in found]
 
     def shows_decimal_comma(self, lines: Sequence[bytes]) -> bool:
         """Whether lines of numbers write decimals with a comma: some do, and none has a point."""
@@ -224,21 +226,27 @@ class Dialect:
         return [cell for cell in cells if cell] if sign == " " else cells
 
 
+_TEXT = re.compile(r"""['"]([^'"]+)['"]""")
+
+
 def _join_thousands(number: re.Match[bytes]) -> bytes:
     return number[0].translate(None, b".,")
 
 
+_LIST = re.compile(r"\s*[\[({](.*)[\])}]\s*", re.DOTALL)
+
+
 def _is_list(cell: str) -> bool:
-    """Whether a cell is a list of numbers in brackets; ``[rad]`` is none."""
-    text = cell.strip()
-    first = text[1:].replace(",", " ").split()[:1]
-    return (
-        text.startswith("[") and text.endswith("]") and bool(first) and is_number(first[0].encode("latin-1", "replace"))
-    )
+    """Whether a cell is a list of numbers, in brackets or between blanks; ``[rad]`` is none."""
+    return _elements(cell) != [cell]
 
 
 def _elements(cell: str) -> list[str]:
-    return cell.strip()[1:-1].replace(",", " ").split() if _is_list(cell) else [cell]
+    """Numbers of a list; else the cell."""
+    bracketed = _LIST.fullmatch(cell)
+    elements = cell.split() if bracketed is None else re.split(r"[\s,;]+", bracketed[1].strip(" \t,;"))
+    is_list = all(is_number(each.encode("latin-1", "replace")) for each in elements[: None if bracketed is None else 1])
+    return elements if is_list and (bracketed or len(elements) > 1) else [cell]
 
 
 def find_first_row(lines: Sequence[bytes], sign: bytes | None) -> tuple[int, Dialect] | None:

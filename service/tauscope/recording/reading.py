@@ -46,8 +46,10 @@ _FORMATS = (
     _Format(MCAP_MAGIC, add_log=add_mcap, reads_ranges=True),
     _Format(SQLITE_MAGIC, add_log=add_database),
     _Format(ROS1_MAGIC, add_log=add_ros1_bag),
-    _Format(array_files.ZIP_MAGIC, array_files.read_arrays, array_files.read_arrays_header),
-    _Format(array_files.MATLAB_MAGIC, array_files.read_arrays, array_files.read_arrays_header),
+    *(
+        _Format(magic, array_files.read_arrays, array_files.read_arrays_header)
+        for magic in (array_files.ZIP_MAGIC, array_files.NUMPY_MAGIC, array_files.MATLAB_MAGIC)
+    ),
 )
 _JSON = _Format(b"", array_files.read_arrays, array_files.read_arrays_header)
 _CSV = _Format(b"", read_csv, read_csv_header)
@@ -58,7 +60,6 @@ _MAGIC_BYTES = 16
 _FOREIGN = (
     (b"\x89HDF", "is an HDF5 file; export it as CSV or Parquet"),
     (b"MATLAB 7.3", "is a MATLAB file of version 7.3; save it by save(..., '-v7')"),
-    (b"\x93NUMPY", "is one NumPy array; save time, positions and torques by np.savez"),
     (b"#ROSBAG V1", "is a bag of ROS 0.x; run `rosbag fix` on it first"),
     (b"\xff\xfe", "is UTF-16 text; save it as UTF-8"),
     (b"\xfe\xff", "is UTF-16 text; save it as UTF-8"),

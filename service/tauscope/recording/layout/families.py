@@ -81,6 +81,11 @@ def time_rank(words: Sequence[str]) -> int | None:
     return next((len(_TIMES) + rank for rank, time in enumerate(_TIMES) if name.endswith(f"_{time}")), None)
 
 
+def is_name_list(column: str) -> bool:
+    """Whether a column, or an array, is the list of joints or columns that other lists follow: ``msg.name``."""
+    return re.split(r"[./]", column)[-1].lower() in ("name", "names", "joint_names", "joints", "columns", "header")
+
+
 # Placeholders of a template: the joint's number from 0, its number from 1, its name.
 FROM_ZERO, FROM_ONE, BY_NAME = "{0}", "{1}", "{name}"
 PLACEHOLDERS = (FROM_ZERO, FROM_ONE, BY_NAME)

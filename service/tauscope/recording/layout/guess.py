@@ -20,6 +20,7 @@ from tauscope.robot.recording_layout import RecordingLayout, Source
 _COMMON_JOINT_COUNTS = (6, 7)
 _PLAIN = re.compile(r"(?!(?:y|n|yes|no|on|off|true|false|null)$)[A-Za-z_][A-Za-z0-9_./-]*", re.IGNORECASE)
 _WHOLE_SECONDS = re.compile(r"(.*[^A-Za-z]|)secs?")
+_PANDAS_INDEX = ("", "Unnamed: 0", "__index_level_0__")  # names of an index without one
 _BY_UNIT_ALONE = 6  # behind every rank by words
 _EFFORTS = ("tau", "i", "taucmd")
 _OPTIONAL = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt")
@@ -75,8 +76,9 @@ def guess_parts(
     groups = {"q": q, "i" if effort == "i" else "tau": found[effort]}
     groups |= {group: found[group] for group in _OPTIONAL if group != effort}
     columns: dict[str, Source] = {} if time is None else {"t": _add_nanoseconds(header, time)}
-    if time is None and header[:1] == [""]:  # the index of a table, as pandas writes it
-        columns = {"t": 1}
+    index = next((place for place, name in enumerate(header, 1) if name in _PANDAS_INDEX), None)
+    if time is None and index is not None:
+        columns = {"t": index}
     columns |= {group: _source(family, count) for group, family in groups.items() if family is not None}
     return RecordingLayout(columns=columns)
 
