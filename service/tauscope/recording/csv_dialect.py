@@ -24,10 +24,12 @@ _NOT_SEPARATORS = bytes(set(range(256)) - set(b",\n"))
 _NUMBER = re.compile(rb"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 # What programs write where a sample was missed: pandas, R, Excel (German, too) and the C library of Windows.
 _MISSED = re.compile(rb"[+-]?(?:nan(?:\(ind\))?|1\.#(?:IND|QNAN))|-|#?n/?a|#nv|<na>|null|none", re.IGNORECASE)
+_SLASHED_DATE = re.compile(rb"([0-9]{4})/([0-9]{2})/([0-9]{2})[/ T]")
 _DATE = re.compile(rb"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ]|[0-9]{2}:[0-9]{2}:")
 _GERMAN_DATE = re.compile(rb"([0-9]{2})\.([0-9]{2})\.([0-9]{4})[T ]+([0-9]{2}:[0-9]{2}:[0-9]{2}(?:[.,][0-9]+)?)")
 _DURATION = re.compile(rb"([0-9]+) days? ([0-9]{2}):([0-9]{2}):([0-9]{2}(?:\.[0-9]+)?)")  # as pandas writes it
 _SHOWN_CHARACTERS = 40
+_ROWS_SEEN = 20  # lines of numbers by which their usual width is told
 
 
 def parse_quickly(text: bytes, delimiter: bytes, width: int, source: Sequence[int]) -> Array | None:
@@ -105,6 +107,7 @@ class Clock:
         if german := _GERMAN_DATE.fullmatch(text):
             day, month, year, time = german.groups()
             text = b"%s-%s-%sT%s" % (year, month, day, time.replace(b",", b"."))
+        text = _SLASHED_DATE.sub(rb"\1-\2-\3T", text)
         if not _DATE.match(text):
             return parse_number(text.removesuffix(b" sec"), file, line, "t")
         try:
@@ -209,7 +212,7 @@ class Dialect:
         return commas and all(_THOUSANDS[True].fullmatch(field.strip()) for field in points)
 
     def _open_cells(self, line: bytes) -> bytes:
-        if line.lstrip().startswith(b"#"):
+        if is_comment(line):
             return line
         fields = [field.encode("latin-1") for cell in self._cells(line.rstrip(b"\r")) for field in _elements(cell)]
         fields = [_THOUSANDS[self.has_decimal_comma].sub(_join_thousands, field) for field in fields]
@@ -250,17 +253,28 @@ def _elements(cell: str) -> list[str]:
 
 
 def find_first_row(lines: Sequence[bytes], sign: bytes | None) -> tuple[int, Dialect] | None:
-    """The first line of numbers and its dialect, by `sign` or as the lines show it; None where there is none."""
+    """The first of the lines of numbers that are as wide as most, and its dialect, by `sign` or as the lines show it.
+
+    None where there is none. Lines of numbers before them, such as a count of the channels, are shorter.
+    """
+    rows: list[tuple[int, int, Dialect]] = []
     for index, line in enumerate(lines):
-        if line.strip().startswith(b"#"):
+        if is_comment(line):
             continue
-        delimiter = find_delimiter(line) if sign is None else sign
-        dialect = Dialect(delimiter)
+        dialect = Dialect(find_delimiter(line) if sign is None else sign)
         fields = replace(dialect, has_decimal_comma=dialect.shows_decimal_comma([line])).split(line)
-        numbers = sum(map(is_number, fields))
-        if len(fields) > 2 and 2 * numbers > len(fields):
-            return index, dialect
-    return None
+        if len(fields) > 2 and 2 * sum(map(is_number, fields)) > len(fields):
+            rows.append((len(fields), index, dialect))
+        if len(rows) == _ROWS_SEEN:
+            break
+    widths = [width for width, _, _ in rows]
+    width = max(widths, key=lambda width: (widths.count(width), width), default=0)
+    return next(((index, dialect) for found, index, dialect in rows if found == width), None)
+
+
+def is_comment(line: bytes) -> bool:
+    """Whether a line is for people: ``# …``, or ``% …`` as MATLAB writes it."""
+    return line.lstrip().startswith((b"#", b"% "))
 
 
 def _has_cells(text: bytes) -> bool:

@@ -101,7 +101,9 @@ def test_velocities_in_the_place_of_torque_are_refused() -> None:
     samples = swing()
     assert samples.velocity is not None
     message = message_of(lambda: examine_recording(change(samples, velocity=samples.effort, effort=samples.velocity)))
-    assert "column tau1: tau1 to tau3 are the velocities of q1 to q3; name the columns of torque by --columns" in message
+    assert (
+        "column tau1: tau1 to tau3 are the velocities of q1 to q3; name the columns of torque by --columns" in message
+    )
     viscous = samples.velocity * [1.0, 1.0, 3.0]
     assert find_implausible(change(samples, effort=viscous)) is None
 

@@ -62,6 +62,25 @@ def test_the_arms_own_measurement_is_taken_in_any_order(name: str) -> None:
         assert layout.columns == {"t": "tout", **expected}
 
 
+@pytest.mark.parametrize("index", ["", "Unnamed: 0", "__index_level_0__"])
+def test_an_index_without_a_name_is_the_time(index: str) -> None:
+    layout = guess_layout([*number("q{1}", "tau{1}"), index], JOINTS)
+    assert layout is not None
+    assert layout.columns == {"t": 5, "q": "q{1}", "tau": "tau{1}"}
+    named = guess_layout([index, "time", *number("q{1}", "tau{1}")], JOINTS)
+    assert named is not None
+    assert named.columns == {"t": "time", "q": "q{1}", "tau": "tau{1}"}
+
+
+def test_repeated_names_as_pandas_numbers_them() -> None:
+    layout = guess_layout(["time", "pos", "pos.1", "torque", "torque.1"], JOINTS)
+    assert layout is not None
+    assert layout.columns == {"t": "time", "q": ["pos", "pos.1"], "tau": ["torque", "torque.1"]}
+    counted = guess_layout(["time", "pos", "pos.1", "pos.2", "torque.1", "torque.2"], JOINTS)
+    assert counted is not None
+    assert counted.columns == {"t": "time", "q": "pos.{1}", "tau": "torque.{1}"}
+
+
 UNITS = {
     "odrive": (("axis{0}.pos_estimate", "axis{0}.vel_estimate", "axis{0}.Iq_measured"), {"q": "rev"}),
     "moteus": (("{1}.position", "{1}.velocity", "{1}.torque", "{1}.q_A"), {"q": "rev"}),

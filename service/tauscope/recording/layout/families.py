@@ -39,7 +39,7 @@ _LEVELS: Mapping[str, int] = {
     **dict.fromkeys(_split("ff feedforward est estimated estimate model modelled predicted nominal friction"), 5),
 }
 _TIMES = _split(
-    "t time zeit timestamp zeitstempel stamp sim_time time_s tout seconds secs sec clock elapsed duration"
+    "t time zeit timestamp zeitstempel stamp sim_time time_s tout x_value seconds secs sec clock elapsed duration"
 )  # the likeliest first
 
 
@@ -169,6 +169,8 @@ def _find_numbered(header: Sequence[str]) -> list[Family]:
             names = tuple(columns[number] for number in sorted(columns))
             is_regular = all(fill_template(template, k, None) == name for k, name in enumerate(names))
             found.append(Family(template, names, is_regular))
+            if first == 1 and (stem := before.rstrip("._ ") + after) in header:  # pandas: `pos`, `pos.1`, `pos.2`
+                found.append(Family(template, (stem, *names), is_regular=False))
     return found
 
 
