@@ -75,10 +75,12 @@ def require_joint_count(found: int, expected: int | None, file: str) -> None:
     """Refuse a recording of another robot. Raises RecordingMismatchError."""
     if expected is None or found == expected:
         return
-    fault = f"column q{found + 1} is missing" if found < expected else f"column q{expected + 1} belongs to no joint"
+    fault, way_out = f"column q{expected + 1} belongs to no joint", ""
+    if found < expected:
+        fault, way_out = f"column q{found + 1} is missing", ", or a robot file that states the others as locked"
     raise RecordingMismatchError(
         f"{file}: the recording has {counted(found, 'joint')}, the robot has {counted(expected, 'joint')}: {fault}; "
-        "give the robot file and the recording of the same arm"
+        f"give the robot file and the recording of the same arm{way_out}"
     )
 
 

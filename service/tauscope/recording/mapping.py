@@ -11,11 +11,11 @@ from tauscope.recording.csv_dialect import is_number
 from tauscope.recording.layout.families import BY_NAME, role_of, words_of
 from tauscope.recording.layout.guess import guess_layout, guess_parts, is_numbered, layout_text
 from tauscope.recording.layout.presets import PRESET_OF
-from tauscope.recording.layout.rename import rename_columns
+from tauscope.recording.layout.rename import mismatch, rename_columns, say_layout
 from tauscope.recording.unit_text import collect_units, root_of, stated_unit
 from tauscope.recording.units import Reading
 from tauscope.result_warning import ResultWarning
-from tauscope.robot.messages import listed, printable
+from tauscope.robot.messages import printable
 from tauscope.robot.recording_layout import UNITS, RecordingLayout
 
 
@@ -97,10 +97,7 @@ def order_by_cells(
     if len(named) != len(robot):
         return layout
     if set(named) != set(robot):
-        raise RecordingMismatchError(
-            f"{file}: the rows name the joints {listed(named)}, the robot's are {listed(robot)}; name the robot's "
-            "joints as the recording does"
-        )
+        raise mismatch(f"{file}: the rows name", named, robot)
     where = dict(zip(layout.names, layout.source, strict=True))
     moved = {}
     for group in {name.rstrip("0123456789") for name in layout.names}:
@@ -153,11 +150,10 @@ def _say_what_fails(error: RecordingError, header: Sequence[str], file: str) -> 
 
 def _say_guess(guess: RecordingLayout, header: Sequence[str], reading: Reading) -> str:
     """What to give where a header suggests all columns, and what it takes for granted."""
-    layout = layout_text(replace(guess, decimal=reading.decimal, delimiter=reading.delimiter))
     condition = "this maps them"
     if not is_numbered(header) and isinstance(guess.columns, Mapping) and isinstance(guess.columns["q"], list):
         condition = f"the first {len(guess.columns['q'])} joints are the robot's"
-    return f"if {condition}, give it as --columns FILE.yaml: {layout}"
+    return say_layout(replace(guess, decimal=reading.decimal, delimiter=reading.delimiter), condition)
 
 
 def _say_parts(header: Sequence[str], reading: Reading) -> str:

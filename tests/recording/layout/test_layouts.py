@@ -120,6 +120,19 @@ def test_joints_of_another_robot_are_listed(tmp_path: Path) -> None:
     assert "names 3 joints (shoulder_pan, elbow, wrist_1), the robot has 3 (a, b, c)" in message
 
 
+def test_joints_that_a_recording_lacks_are_to_be_locked(tmp_path: Path) -> None:
+    path = write(tmp_path / "file.csv", columns_of(STYLES["plotjuggler"]), np.column_stack([TIME, Q, QD, TAU]))
+    message = message_of(lambda: read(path, read_layout("plotjuggler"), (*JOINTS, "finger")))
+    assert "finger is missing; record them too, or state in a robot file locked: {finger: 0}" in message
+
+
+def test_a_preset_of_another_tool_shows_the_mapping_that_would_do(tmp_path: Path) -> None:
+    path = write(tmp_path / "file.csv", columns_of(STYLES["franka"]), np.column_stack([TIME, Q, QD, TAU]))
+    message = message_of(lambda: read(path, read_layout("mujoco"), JOINTS))
+    assert "no column holds the position, which mujoco calls qpos" in message
+    assert np.array_equal(rows_of(read(path, guess_of(message), JOINTS)), np.column_stack([TIME, Q, TAU, QD]))
+
+
 def test_measured_torque_goes_before_current_and_current_before_a_command(tmp_path: Path) -> None:
     header = ["timestamp", "actual_q_0", "target_moment_0", "actual_current_0"]
     path = write(tmp_path / "file.csv", header, np.column_stack([TIME, Q]))
@@ -452,7 +465,7 @@ def test_joints_that_rows_name_are_matched_by_name(tmp_path: Path, has_names: bo
     found = rows_of(read(path, layout, JOINTS))
     np.testing.assert_allclose(found[:, 1:10], np.column_stack([Q, TAU, QD]))
     message = message_of(lambda: read(path, layout, ("a", "b", "c")))
-    assert "the rows name the joints elbow, shoulder_pan, wrist_1, the robot's are a, b, c" in message
+    assert "the rows name 3 joints (elbow, shoulder_pan, wrist_1), the robot has 3 (a, b, c)" in message
 
 
 @pytest.mark.parametrize(
