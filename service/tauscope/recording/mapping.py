@@ -11,7 +11,7 @@ from tauscope.recording.csv_dialect import is_number
 from tauscope.recording.layout.families import BY_NAME, role_of, words_of
 from tauscope.recording.layout.guess import guess_layout, guess_parts, is_numbered, layout_text
 from tauscope.recording.layout.presets import PRESET_OF
-from tauscope.recording.layout.rename import mismatch, rename_columns, say_layout
+from tauscope.recording.layout.rename import mismatch, rename_columns, require_as_many, say_layout
 from tauscope.recording.unit_text import collect_units, root_of, stated_unit
 from tauscope.recording.units import Reading
 from tauscope.result_warning import ResultWarning
@@ -47,7 +47,7 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
         if guess is None:
             if _is_ours(header):
                 raise
-            _require_known_names(header, reading, file)
+            require_as_many(header, None, None, reading, file)
             raise RecordingError(f"{error}; {_say_parts(header, reading)}") from error
         raise RecordingError(f"{_say_what_fails(error, header, file)}; {_say_guess(guess, header, reading)}") from error
 
@@ -109,17 +109,17 @@ def order_by_cells(
 
 def suggest_layout(header: Sequence[str], reading: Reading, file: str) -> RecordingLayout | None:
     """The mapping that the header suggests, None where a file with it would be refused again."""
-    guess = guess_layout(header, reading.joint_names, prefers_torque=reading.prefers_torque)
+    guess = guess_layout(header, reading)
     if guess is None:
         return None
     units = _units_of_tool(header)
     try:
-        layout = find_columns(rename_columns(header, replace(reading, columns=guess.columns), file), file)
+        layout = find_columns(rename_columns(header, replace(reading, columns=guess), file), file)
     except RecordingError:
         return None
     with suppress(RecordingError):  # who reads the file so is told of units that are not known
         units = {**units, **units_of_names(header, layout, replace(reading, units=units), file)}
-    return replace(guess, units=units)
+    return RecordingLayout(columns=guess, units=units)
 
 
 def _units_of_tool(header: Sequence[str]) -> Mapping[str, str]:
@@ -128,13 +128,6 @@ def _units_of_tool(header: Sequence[str]) -> Mapping[str, str]:
     return next(
         (preset.units for preset in marked if any(re.search(f"{preset.mark}(?![A-Za-z])", name) for name in header)), {}
     )
-
-
-def _require_known_names(header: Sequence[str], reading: Reading, file: str) -> None:
-    """Refuse columns that name other joints than the robot's: the message lists both."""
-    named = guess_layout(header) if reading.joint_names is not None else None
-    if named is not None and isinstance(named.columns, Mapping) and BY_NAME in str(named.columns["q"]):
-        rename_columns(header, replace(reading, columns=named.columns), file)
 
 
 def _is_ours(header: Sequence[str]) -> bool:
@@ -158,8 +151,7 @@ def _say_guess(guess: RecordingLayout, header: Sequence[str], reading: Reading) 
 
 def _say_parts(header: Sequence[str], reading: Reading) -> str:
     """What to give where it suggests some: a mapping with ``?`` for the others."""
-    found = guess_parts(header, reading.joint_names).columns
-    parts = dict(found) if isinstance(found, Mapping) else {}
+    parts = guess_parts(header, reading)
     lacks = {"t": "?", "q": "?{1}"} | ({} if {"i", "qref"} & set(parts) else {"tau": "?{1}"})
     layout = layout_text(RecordingLayout(columns=lacks | parts))
     timeless = " (without t, and with --units t=index --rate HZ, where no column is the time)"

@@ -25,7 +25,7 @@ from tauscope.recording.ros_bags import ROS1_MAGIC, SQLITE_MAGIC, add_database, 
 from tauscope.recording.units import SI, Reading
 from tauscope.remote_files import copy_locally, find_path, is_folder, knows_ranges, name_failures, open_ranges
 from tauscope.robot.messages import printable
-from tauscope.robot.recording_layout import UNITS
+from tauscope.robot.recording_layout import UNITS, RecordingLayout
 from tauscope.robot.robot import Robot
 from tauscope.strict_model import entry
 
@@ -190,7 +190,7 @@ def find_mapping(path: Path, robot: Robot | None = None, reading: Reading = SI) 
 
 def _suggest(header: Sequence[str], reading: Reading) -> ColumnMapping:
     if reading.columns is None:
-        guess = suggest_layout(header, reading, "") or guess_parts(header, reading.joint_names)
+        guess = suggest_layout(header, reading, "") or RecordingLayout(columns=guess_parts(header, reading))
         reading = replace(reading, columns=guess.columns, units={**guess.units, **reading.units})
     try:
         renamed = rename_columns(header, reading, "")

@@ -9,6 +9,7 @@ from tauscope.recording.layout.guess import guess_layout
 from tauscope.recording.mapping import suggest_layout
 
 JOINTS = ("pan", "lift")
+READING = Reading(joint_names=JOINTS)
 
 
 def number(*templates: str) -> list[str]:
@@ -57,28 +58,23 @@ CHOICES = {
 def test_the_arms_own_measurement_is_taken_in_any_order(name: str) -> None:
     templates, expected = CHOICES[name]
     for order in permutations(templates):
-        layout = guess_layout(["tout", *number(*order)], JOINTS)
-        assert layout is not None
-        assert layout.columns == {"t": "tout", **expected}
+        layout = guess_layout(["tout", *number(*order)], READING)
+        assert layout == {"t": "tout", **expected}
 
 
 @pytest.mark.parametrize("index", ["", "Unnamed: 0", "__index_level_0__"])
 def test_an_index_without_a_name_is_the_time(index: str) -> None:
-    layout = guess_layout([*number("q{1}", "tau{1}"), index], JOINTS)
-    assert layout is not None
-    assert layout.columns == {"t": 5, "q": "q{1}", "tau": "tau{1}"}
-    named = guess_layout([index, "time", *number("q{1}", "tau{1}")], JOINTS)
-    assert named is not None
-    assert named.columns == {"t": "time", "q": "q{1}", "tau": "tau{1}"}
+    layout = guess_layout([*number("q{1}", "tau{1}"), index], READING)
+    assert layout == {"t": 5, "q": "q{1}", "tau": "tau{1}"}
+    named = guess_layout([index, "time", *number("q{1}", "tau{1}")], READING)
+    assert named == {"t": "time", "q": "q{1}", "tau": "tau{1}"}
 
 
 def test_repeated_names_as_pandas_numbers_them() -> None:
-    layout = guess_layout(["time", "pos", "pos.1", "torque", "torque.1"], JOINTS)
-    assert layout is not None
-    assert layout.columns == {"t": "time", "q": ["pos", "pos.1"], "tau": ["torque", "torque.1"]}
-    counted = guess_layout(["time", "pos", "pos.1", "pos.2", "torque.1", "torque.2"], JOINTS)
-    assert counted is not None
-    assert counted.columns == {"t": "time", "q": "pos.{1}", "tau": "torque.{1}"}
+    layout = guess_layout(["time", "pos", "pos.1", "torque", "torque.1"], READING)
+    assert layout == {"t": "time", "q": ["pos", "pos.1"], "tau": ["torque", "torque.1"]}
+    counted = guess_layout(["time", "pos", "pos.1", "pos.2", "torque.1", "torque.2"], READING)
+    assert counted == {"t": "time", "q": "pos.{1}", "tau": "torque.{1}"}
 
 
 UNITS = {

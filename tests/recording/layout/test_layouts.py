@@ -344,9 +344,9 @@ def test_words_go_before_units() -> None:
         *(f"X{k} [Nm]" for k in (1, 2)),
         *(f"predicted torque {k}" for k in (1, 2)),
     ]
-    layout = guess_layout(header, ("a", "b"))
+    layout = guess_layout(header, Reading(joint_names=("a", "b")))
     assert layout is not None
-    assert layout.columns == {"t": "t", "q": "q{1}", "tau": "predicted torque {1}"}
+    assert layout == {"t": "t", "q": "q{1}", "tau": "predicted torque {1}"}
 
 
 @pytest.mark.parametrize("has_joints", [True, False])

@@ -15,6 +15,7 @@ from tauscope.recording.layout.families import (
 )
 from tauscope.recording.layout.presets import PRESET_OF, Preset
 from tauscope.recording.unit_text import find_quantity
+from tauscope.recording.units import Reading
 from tauscope.robot.recording_layout import RecordingLayout, Source
 
 _COMMON_JOINT_COUNTS = (6, 7)
@@ -29,34 +30,17 @@ _OPTIONAL = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt")
 Ranking = Callable[[Sequence[str]], tuple[str, int] | None]
 
 
-def guess_layout(
-    header: Sequence[str],
-    joint_names: Sequence[str] | None = None,
-    *,
-    preset: str | None = None,
-    prefers_torque: bool = False,
-) -> RecordingLayout | None:
-    """A header's layout; None without positions, efforts or commands, and time. `preset`: tool, None for any.
-
-    `prefers_torque`: whether commanded torques go before currents, because no torque constant is known.
-    """
-    found = guess_parts(header, joint_names, preset=preset, prefers_torque=prefers_torque)
-    columns = found.columns if isinstance(found.columns, Mapping) else {}
-    return found if {"t", "q"} <= set(columns) and {"tau", "i", "qref"} & set(columns) else None
+def guess_layout(header: Sequence[str], reading: Reading, preset: str | None = None) -> dict[str, Source] | None:
+    """A header's columns; None without positions, efforts or commands, and time. `preset`: a tool, None for any."""
+    found = guess_parts(header, reading, preset)
+    return found if {"t", "q"} <= found.keys() and {"tau", "i", "qref"} & found.keys() else None
 
 
-def guess_parts(
-    header: Sequence[str],
-    joint_names: Sequence[str] | None = None,
-    *,
-    preset: str | None = None,
-    prefers_torque: bool = False,
-) -> RecordingLayout:
-    """As much of a header's layout as its columns suggest; arguments as of `guess_layout`."""
-    if is_numbered(header) and preset is not None:
-        return RecordingLayout(columns={})
+def guess_parts(header: Sequence[str], reading: Reading, preset: str | None = None) -> dict[str, Source]:
+    """As many columns as their names suggest; arguments as of `guess_layout`."""
+    joint_names = reading.joint_names
     if is_numbered(header):
-        return _guess_by_place(len(header), None if joint_names is None else len(joint_names))
+        return {} if preset else _guess_by_place(len(header), None if joint_names is None else len(joint_names))
     rank = role_of if preset is None else _preset_ranking(PRESET_OF[preset])
     every = find_families(header, joint_names)
     families = [(family, found) for family in every if (found := rank(family.words))]
@@ -67,7 +51,7 @@ def guess_parts(
     efforts = [source_of(family.words) for family, (role, _) in families if role in _EFFORTS]
     q = _choose(families, "q", count, efforts)
     count = count or (len(q.columns) if q else None)
-    order = ("tau", "taucmd", "i") if prefers_torque else _EFFORTS
+    order = ("tau", "taucmd", "i") if reading.prefers_torque else _EFFORTS
     if joint_names is None:  # then nothing says which of more columns are the joints'
         families = [(family, found) for family, found in families if len(family.columns) == count]
     own = [source_of(q.words)] if q else []
@@ -79,8 +63,7 @@ def guess_parts(
     index = next((place for place, name in enumerate(header, 1) if name in _PANDAS_INDEX), None)
     if time is None and index is not None:
         columns = {"t": index}
-    columns |= {group: _source(family, count) for group, family in groups.items() if family is not None}
-    return RecordingLayout(columns=columns)
+    return columns | {group: _source(family, count) for group, family in groups.items() if family is not None}
 
 
 def _rank_by_unit(family: Family) -> tuple[str, int] | None:
@@ -109,18 +92,20 @@ def is_numbered(header: Sequence[str]) -> bool:
     return list(header) == [str(number) for number in range(1, len(header) + 1)]
 
 
-def _guess_by_place(width: int, joint_count: int | None) -> RecordingLayout:
+def _guess_by_place(width: int, joint_count: int | None) -> dict[str, Source]:
     """Groups behind the time, behind all that `ros2 topic echo --csv` writes before them, or without time."""
     counts = [joint_count] if joint_count else [*_COMMON_JOINT_COUNTS, (width - 1) // 2]
-    shapes = [(n, groups) for n in counts if n > 0 for groups in (("q", "tau"), ("q", "qd", "tau"))]
+    shapes = [
+        (n, groups) for n in counts if n > 0 for groups in (("q", "tau"), ("q", "qd", "tau"), ("q", "qd", "qdd", "tau"))
+    ]
     times: Sequence[tuple[dict[str, Source], bool]] = (({"t": 1}, False), ({"t": [1, 2]}, True), ({}, False))
     for time, has_names in times:
         for n, groups in shapes:
             first = (3 + n if has_names else len(time)) + 1
             if width == first - 1 + len(groups) * n:
                 places = {group: [first + k * n + j for j in range(n)] for k, group in enumerate(groups)}
-                return RecordingLayout(columns={**time, **places})
-    return RecordingLayout(columns={})
+                return {**time, **places}
+    return {}
 
 
 def _preset_ranking(preset: Preset) -> Ranking:

@@ -38,47 +38,42 @@ def rename_columns(header: Sequence[str], reading: Reading, file: str) -> list[s
 
 
 def _preset_columns(header: Sequence[str], preset: str, reading: Reading, file: str) -> Mapping[str, Source]:
-    layout = guess_layout(header, reading.joint_names, preset=preset, prefers_torque=reading.prefers_torque)
-    _require_as_many(header, preset, layout, reading, file)
-    if layout is not None:
-        return _by_target(layout)
-    parts, known = _by_target(guess_parts(header, reading.joint_names, preset=preset)), PRESET_OF[preset].columns
+    columns = guess_layout(header, reading, preset)
+    require_as_many(header, preset, columns, reading, file)
+    if columns is not None:
+        return columns
+    parts, known = guess_parts(header, reading, preset), PRESET_OF[preset].columns
     lacks, groups = next(
         (words, groups)
         for words, *groups in (("time", "t"), ("position", "q"), ("effort", "tau", "i", "taucmd"))
         if not parts.keys() & {*groups}
     )
     names = [name for group in groups for name in known.get(group, ())]
-    other = guess_layout(header, reading.joint_names, prefers_torque=reading.prefers_torque)
-    way_out = (
-        "record it, or name the columns by --columns FILE.yaml" if other is None else say_layout(other, "this maps")
-    )
+    other = guess_layout(header, reading)
+    way_out = "record it, or name the columns by --columns FILE.yaml"
+    way_out = way_out if other is None else say_layout(RecordingLayout(columns=other), "this maps")
     raise RecordingError(
         f"{file}: no column holds the {lacks}, which {preset} calls {' or '.join(names)}; the columns are "
         f"{listed(header)}; {way_out}"
     )
 
 
-def _by_target(layout: RecordingLayout) -> Mapping[str, Source]:
-    assert isinstance(layout.columns, Mapping)  # noqa: S101 - a guess always is one
-    return layout.columns
-
-
-def _require_as_many(
-    header: Sequence[str], preset: str, layout: RecordingLayout | None, reading: Reading, file: str
+def require_as_many(
+    header: Sequence[str], preset: str | None, columns: Mapping[str, Source] | None, reading: Reading, file: str
 ) -> None:
-    """Refuse a preset's columns of other joints, or of more or fewer, than the robot has."""
-    found = None if reading.joint_names is None else guess_layout(header, None, preset=preset)
+    """Refuse columns of other joints, or of more or fewer, than the robot has. `columns`: those that fit it, if any."""
+    unnamed = replace(reading, joint_names=None)
+    found = None if reading.joint_names is None else guess_layout(header, unnamed, preset)
     if found is None or reading.joint_names is None:
         return
-    if layout is None:
-        _Mapping(header, reading, file).expand(_by_target(found))  # names the joints that differ
-    targets = _Mapping(header, replace(reading, joint_names=None), file).expand(_by_target(found)).values()
+    if columns is None:
+        _Mapping(header, reading, file).expand(found)  # names the joints that differ
+    targets = _Mapping(header, unnamed, file).expand(found).values()
     count, wanted = sum(_group(target) == "q" for target in targets), len(reading.joint_names)
-    if count != wanted and (layout is None or BY_NAME not in str(_by_target(layout)["q"])):
+    if count != wanted and (columns is None or BY_NAME not in str(columns["q"])):
         hint = "give the robot file and the recording of the same arm"
-        if layout is not None:
-            hint = say_layout(layout, f"the first {wanted} are the robot's")
+        if columns is not None:
+            hint = say_layout(RecordingLayout(columns=columns), f"the first {wanted} are the robot's")
         raise RecordingMismatchError(f"{file}: the columns are of {count} joints, the robot has {wanted}; {hint}")
 
 
