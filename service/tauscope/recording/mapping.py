@@ -16,7 +16,7 @@ from tauscope.recording.unit_text import collect_units, root_of, stated_unit
 from tauscope.recording.units import Reading
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.messages import printable
-from tauscope.robot.recording_layout import UNITS, RecordingLayout
+from tauscope.robot.recording_layout import UNITS, RecordingLayout, Source
 
 
 def find_layout(header: Sequence[str], reading: Reading, file: str) -> tuple[Reading, ColumnLayout]:
@@ -47,7 +47,8 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
         if guess is None:
             if _is_ours(header):
                 raise
-            require_as_many(header, None, None, reading, file)
+            if not is_numbered(header):
+                require_as_many(header, None, None, reading, file)
             raise RecordingError(f"{error}; {_say_parts(header, reading)}") from error
         raise RecordingError(f"{_say_what_fails(error, header, file)}; {_say_guess(guess, header, reading)}") from error
 
@@ -91,20 +92,34 @@ def order_by_cells(
     is_by_place = reading.columns is not None and BY_NAME not in str(reading.columns)
     if len(robot) < 2 or not is_by_place:
         return layout
-    named = [cell for name, cell in zip(header, cells, strict=False) if "name" in words_of(name)]
+    named = {
+        cell: name
+        for name, cell in zip(header, cells, strict=False)
+        if "name" in words_of(name) and _LAST_NUMBER.search(name)
+    }
     if is_numbered(header):  # the texts before the numbers, of which a frame may be the first
-        named = [cell for cell in cells if not is_number(cell.encode()) and cell][-len(robot) :]
-    if len(named) != len(robot):
+        texts = [cell for cell in cells if cell and not is_number(cell.encode())][-len(robot) :]
+        named = {cell: str(place) for place, cell in enumerate(texts)}
+    if len(named) < len(robot):
         return layout
-    if set(named) != set(robot):
-        raise mismatch(f"{file}: the rows name", named, robot)
+    if not set(robot) <= named.keys():
+        raise mismatch(f"{file}: the rows name", [*named], robot)
+
+    def move(column: str, index: int) -> int:
+        """Place of the column of the joint that the robot has in the place of this one."""
+        group = column.rstrip("0123456789")
+        joint = robot[int(column[len(group) :] or 1) - 1]
+        if is_numbered(header):
+            columns = sorted(each for name, each in where.items() if name.rstrip("0123456789") == group)
+            return columns[int(named[joint])] if len(columns) == len(robot) else index
+        wanted = _LAST_NUMBER.sub(_LAST_NUMBER.findall(named[joint])[0], header[index])
+        return header.index(wanted) if wanted in header else index
+
     where = dict(zip(layout.names, layout.source, strict=True))
-    moved = {}
-    for group in {name.rstrip("0123456789") for name in layout.names}:
-        columns = sorted(index for name, index in where.items() if name.rstrip("0123456789") == group)
-        if len(columns) == len(robot):
-            moved |= {f"{group}{joint}": columns[named.index(name)] for joint, name in enumerate(robot, 1)}
-    return replace(layout, source=tuple((where | moved)[name] for name in layout.names))
+    return replace(layout, source=tuple(move(column, index) for column, index in where.items()))
+
+
+_LAST_NUMBER = re.compile(r"[0-9]+(?=[^0-9]*$)")
 
 
 def suggest_layout(header: Sequence[str], reading: Reading, file: str) -> RecordingLayout | None:
@@ -152,7 +167,10 @@ def _say_guess(guess: RecordingLayout, header: Sequence[str], reading: Reading) 
 def _say_parts(header: Sequence[str], reading: Reading) -> str:
     """What to give where it suggests some: a mapping with ``?`` for the others."""
     parts = guess_parts(header, reading)
-    lacks = {"t": "?", "q": "?{1}"} | ({} if {"i", "qref"} & set(parts) else {"tau": "?{1}"})
+    each: Source = ["?"] * len(reading.joint_names or "?") if is_numbered(header) else "?{1}"
+    lacks: dict[str, Source] = {"t": "?", "q": each, "tau": each}
+    if {"i", "qref"} & parts.keys():
+        del lacks["tau"]
     layout = layout_text(RecordingLayout(columns=lacks | parts))
     timeless = " (without t, and with --units t=index --rate HZ, where no column is the time)"
     return f"give --columns FILE.yaml with a name for each ?{'' if 't' in parts else timeless}: {layout}"

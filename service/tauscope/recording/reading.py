@@ -60,6 +60,7 @@ _MAGIC_BYTES = 16
 _FOREIGN = (
     (b"\x89HDF", "is an HDF5 file; export it as CSV or Parquet"),
     (b"MATLAB 7.3", "is a MATLAB file of version 7.3; save it by save(..., '-v7')"),
+    (b"header:\n", "is text of `ros2 topic echo`; record a bag, or echo with --csv"),
     (b"#ROSBAG V1", "is a bag of ROS 0.x; run `rosbag fix` on it first"),
     (b"\xff\xfe", "is UTF-16 text; save it as UTF-8"),
     (b"\xfe\xff", "is UTF-16 text; save it as UTF-8"),

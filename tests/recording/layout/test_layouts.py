@@ -468,6 +468,28 @@ def test_joints_that_rows_name_are_matched_by_name(tmp_path: Path, has_names: bo
     assert "the rows name 3 joints (elbow, shoulder_pan, wrist_1), the robot has 3 (a, b, c)" in message
 
 
+@given(order=st.permutations([*JOINTS, "finger", "thumb"]))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=20)
+def test_rows_that_name_more_joints_than_the_robot_has(tmp_path: Path, order: list[str]) -> None:
+    places = [JOINTS.index(name) if name in JOINTS else -1 for name in order]
+    groups = [np.column_stack([each, np.zeros(len(TIME))])[:, places].tolist() for each in (Q, TAU)]
+    fields = [f"field.{name}{k}" for name in ("name", "position", "effort") for k in range(len(order))]
+    rows = [[float(time), *order, *q, *tau] for time, q, tau in zip(TIME, *groups, strict=True)]
+    path = tmp_path / "echo.csv"
+    path.write_text("\n".join([",".join(["time", *fields]), *(",".join(map(str, row)) for row in rows)]) + "\n")
+    layout = guess_of(message_of(lambda: read(path, RecordingLayout(), JOINTS)))
+    assert np.array_equal(rows_of(read(path, layout, JOINTS)), np.column_stack([TIME, Q, TAU]))
+
+
+def test_a_file_without_names_asks_for_the_numbers_of_its_columns(tmp_path: Path) -> None:
+    path = write(tmp_path / "file.csv", None, np.column_stack([TIME, Q, TAU, TAU[:, :1]]))
+    message = message_of(lambda: read_recording(path, joint_names=JOINTS))
+    assert '{t: "?", q: ["?", "?", "?"], tau: ["?", "?", "?"]}' in message
+    filled = message.replace('t: "?"', "t: 1").replace('q: ["?", "?", "?"]', "q: [2, 3, 4]")
+    layout = guess_of(filled.replace('["?", "?", "?"]', "[5, 6, 7]"))
+    assert np.array_equal(rows_of(read(path, layout, JOINTS)), np.column_stack([TIME, Q, TAU]))
+
+
 @pytest.mark.parametrize(
     ("better", "worse"),
     [
