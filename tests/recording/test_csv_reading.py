@@ -178,6 +178,7 @@ BAD = {
     ),
     "NUL": (field_changed(17, "q1", "1\0"), "line 17 holds a NUL byte"),
     "NUL in the header": (changed(1, "t\0" + LINES[0]), "line 1 holds a NUL byte"),
+    "echo of a topic": ("header:\n  stamp:\n", "is text of `ros2 topic echo`; record a bag, or echo with --csv"),
     "UTF-16": ("\n".join(LINES).encode("utf-16"), "is UTF-16 text; save it as UTF-8"),
     "long line": (changed(17, "1," + "2" * 2**21), "line 17 has"),
     "long header": ("t" * 2**21, "line 1 has more than 1048576 characters"),
