@@ -22,7 +22,7 @@ from tauscope.recording.layout.families import is_name_list
 from tauscope.recording.recording import Array, Recording
 from tauscope.robot.messages import listed, reason
 
-ZIP_MAGIC, NUMPY_MAGIC, MATLAB_MAGIC = b"PK\x03\x04", b"\x93NUMPY", b"MATLAB 5.0"
+MAGICS = ZIP_MAGIC, NUMPY_MAGIC, MATLAB_MAGIC = b"PK\x03\x04", b"\x93NUMPY", b"MATLAB 5.0"
 JSON_START = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:(?:\[\s*)?\{|\[\s*\[)")  # an object, or a list of them or of lists
 
 _MOST_COLUMNS = 10_000
@@ -56,12 +56,7 @@ def read_arrays_header(path: Path, name: str) -> list[str]:
 def _read_columns(path: Path, name: str) -> dict[str, Array]:
     with path.open("rb") as file:
         magic = file.read(len(MATLAB_MAGIC))
-    readers = {
-        ZIP_MAGIC: (_read_npz, "NumPy archive"),
-        NUMPY_MAGIC: (_read_npy, "NumPy file"),
-        MATLAB_MAGIC: (_read_matlab, "MATLAB file"),
-    }
-    read, kind = next((entry for start, entry in readers.items() if magic.startswith(start)), (None, "JSON file"))
+    read, kind = next((entry for start, entry in _READERS.items() if magic.startswith(start)), (None, "JSON file"))
     try:
         return _read_json(path, name) if read is None else _join_arrays(read(path, name), name)
     except _UNREADABLE as error:
@@ -98,6 +93,13 @@ def _read_matlab(path: Path, name: str) -> dict[str, Any]:
 
     found = _flatten(loadmat(path, simplify_cells=True), "")
     return {key: array for key, array in found if isinstance(array, np.ndarray)}
+
+
+_READERS = {
+    ZIP_MAGIC: (_read_npz, "NumPy archive"),
+    NUMPY_MAGIC: (_read_npy, "NumPy file"),
+    MATLAB_MAGIC: (_read_matlab, "MATLAB file"),
+}
 
 
 def _unpack_matlab(content: bytes) -> Iterator[bytes]:

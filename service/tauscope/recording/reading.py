@@ -46,10 +46,7 @@ _FORMATS = (
     _Format(MCAP_MAGIC, add_log=add_mcap, reads_ranges=True),
     _Format(SQLITE_MAGIC, add_log=add_database),
     _Format(ROS1_MAGIC, add_log=add_ros1_bag),
-    *(
-        _Format(magic, array_files.read_arrays, array_files.read_arrays_header)
-        for magic in (array_files.ZIP_MAGIC, array_files.NUMPY_MAGIC, array_files.MATLAB_MAGIC)
-    ),
+    *(_Format(magic, array_files.read_arrays, array_files.read_arrays_header) for magic in array_files.MAGICS),
 )
 _JSON = _Format(b"", array_files.read_arrays, array_files.read_arrays_header)
 _CSV = _Format(b"", read_csv, read_csv_header)

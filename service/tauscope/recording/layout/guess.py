@@ -2,17 +2,10 @@
 
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 
-from tauscope.recording.layout.families import (
-    Family,
-    find_families,
-    is_silent,
-    role_of,
-    source_of,
-    time_rank,
-    words_of,
-)
+from tauscope.recording.layout.families import Family, find_families, is_silent, role_of, source_of, time_rank, words_of
 from tauscope.recording.layout.presets import PRESET_OF, Preset
 from tauscope.recording.unit_text import find_quantity
 from tauscope.recording.units import Reading
@@ -26,9 +19,6 @@ _BY_UNIT_ALONE = 6  # behind every rank by words
 _EFFORTS = ("tau", "i", "taucmd")
 _OPTIONAL = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt")
 
-# The group that words of a column mean, and how far they are from the first choice.
-Ranking = Callable[[Sequence[str]], tuple[str, int] | None]
-
 
 def guess_layout(header: Sequence[str], reading: Reading, preset: str | None = None) -> dict[str, Source] | None:
     """A header's columns; None without positions, efforts or commands, and time. `preset`: a tool, None for any."""
@@ -38,31 +28,29 @@ def guess_layout(header: Sequence[str], reading: Reading, preset: str | None = N
 
 def guess_parts(header: Sequence[str], reading: Reading, preset: str | None = None) -> dict[str, Source]:
     """As many columns as their names suggest; arguments as of `guess_layout`."""
-    joint_names = reading.joint_names
+    count = None if reading.joint_names is None else len(reading.joint_names)
     if is_numbered(header):
-        return {} if preset else _guess_by_place(len(header), None if joint_names is None else len(joint_names))
-    rank = role_of if preset is None else _preset_ranking(PRESET_OF[preset])
-    every = find_families(header, joint_names)
+        return {} if preset else _guess_by_place(len(header), count)
+    every, tool = find_families(header, reading.joint_names), None if preset is None else PRESET_OF[preset]
+    rank = role_of if tool is None else partial(_rank_by_ends, tool)
     families = [(family, found) for family in every if (found := rank(family.words))]
-    if preset is None:
+    if tool is None:
         families += [(family, found) for family in every if (found := _rank_by_unit(family))]
-    time = _find_time(header, None if preset is None else PRESET_OF[preset].columns["t"])
-    count = None if joint_names is None else len(joint_names)
+    time = _find_time(header, tool.columns["t"] if tool else ())
     efforts = [source_of(family.words) for family, (role, _) in families if role in _EFFORTS]
     q = _choose(families, "q", count, efforts)
     count = count or (len(q.columns) if q else None)
     order = ("tau", "taucmd", "i") if reading.prefers_torque else _EFFORTS
-    if joint_names is None:  # then nothing says which of more columns are the joints'
+    if reading.joint_names is None:  # then nothing says which of more columns are the joints'
         families = [(family, found) for family, found in families if len(family.columns) == count]
     own = [source_of(q.words)] if q else []
     found = {role: _choose(families, role, count, own) for role in (*order, *_OPTIONAL)}
     effort = next((role for role in order if found[role]), "tau")
     groups = {"q": q, "i" if effort == "i" else "tau": found[effort]}
     groups |= {group: found[group] for group in _OPTIONAL if group != effort}
-    columns: dict[str, Source] = {} if time is None else {"t": _add_nanoseconds(header, time)}
     index = next((place for place, name in enumerate(header, 1) if name in _PANDAS_INDEX), None)
-    if time is None and index is not None:
-        columns = {"t": index}
+    clock = index if time is None else _add_nanoseconds(header, time)
+    columns: dict[str, Source] = {} if clock is None else {"t": clock}
     return columns | {group: _source(family, count) for group, family in groups.items() if family is not None}
 
 
@@ -108,28 +96,21 @@ def _guess_by_place(width: int, joint_count: int | None) -> dict[str, Source]:
     return {}
 
 
-def _preset_ranking(preset: Preset) -> Ranking:
-    """Ranks words by the ends that a preset names."""
-    ends = [(f"_{end}", group, rank) for group, all_ in preset.columns.items() for rank, end in enumerate(all_)]
-
-    def rank(words: Sequence[str]) -> tuple[str, int] | None:
-        name = "_" + "_".join(words)
-        return next(((group, rank) for end, group, rank in ends if name.endswith(end) and group != "t"), None)
-
-    return rank
+def _rank_by_ends(preset: Preset, words: Sequence[str]) -> tuple[str, int] | None:
+    """As `role_of`, by the ends of names that a preset knows."""
+    name = "_" + "_".join(words)
+    ends = ((end, group, rank) for group, ends in preset.columns.items() for rank, end in enumerate(ends))
+    return next(((group, rank) for end, group, rank in ends if group != "t" and name.endswith(f"_{end}")), None)
 
 
-def _find_time(header: Sequence[str], known: Sequence[str] | None) -> str | None:
+def _find_time(header: Sequence[str], known: Sequence[str]) -> str | None:
     """The column with the time; a preset's own names go before any other."""
-    ranked = []
-    for column in header:
-        words = words_of(column)
-        name = "_".join(words)
-        rank = time_rank(words)
-        if known is not None and name in known:
-            rank = known.index(name) - len(known)
-        if rank is not None:
-            ranked.append((rank, len(column), column))
+
+    def rank(column: str) -> int | None:
+        name = "_".join(words_of(column))
+        return known.index(name) - len(known) if name in known else time_rank(words_of(column))
+
+    ranked = [(found, len(column), column) for column in header if (found := rank(column)) is not None]
     return min(ranked)[2] if ranked else None
 
 
