@@ -1,7 +1,8 @@
 """Lists that name their joints are matched by these names, whatever holds them, and never by place."""
 
 import json
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from scipy.io import savemat
 from recording.layout_files import JOINTS, TAU, TIME, Q, guess_of, read
 from recording.recording_files import message_of, rows_of
 from tauscope.recording import read_recording
+from tauscope.robot import RecordingLayout
 
 Lists = tuple[list[str], np.ndarray, np.ndarray]
 
@@ -74,5 +76,9 @@ def test_joints_are_matched_by_the_list_that_names_them(tmp_path: Path, kind: st
     path = tmp_path / f"log.{kind}"
     WRITERS[kind](path, ([JOINTS[k] for k in order], Q[:, order], TAU[:, order]))
     guess = guess_of(message_of(lambda: read_recording(path, joint_names=JOINTS)))
+    assert isinstance(guess.columns, Mapping)
     assert np.array_equal(rows_of(read(path, guess, JOINTS)), np.column_stack([TIME, Q, TAU]))
+    plain = {target: re.sub(r"\[.*", "", str(source)) for target, source in guess.columns.items()}
+    named = read(path, RecordingLayout(columns=plain), JOINTS)
+    assert np.array_equal(rows_of(named), np.column_stack([TIME, Q, TAU]))
     assert "the robot has 3 (a, b, c)" in message_of(lambda: read(path, guess, ("a", "b", "c")))

@@ -115,12 +115,10 @@ def _joint_count(joints: dict[str, list[int]], effort_kind: EffortKind, header: 
             f" stated actuator makes it; the columns are {listed(header)}"
         )
     joint_count = max(joints["q"][-1], joints[effort][-1])
-    for prefix in ("q", effort):
-        present = set(joints[prefix])
-        for joint in range(1, joint_count + 1):
-            if joint not in present:
-                other = f"q{joint_count}" if joint_count in joints["q"] else f"{effort}{joint_count}"
-                raise RecordingError(f"{file}: column {prefix}{joint} is missing: the file has columns up to {other}")
+    every = ((prefix, joint) for prefix in ("q", effort) for joint in range(1, joint_count + 1))
+    if missing := next(((prefix, joint) for prefix, joint in every if joint not in joints[prefix]), None):
+        other = f"q{joint_count}" if joint_count in joints["q"] else f"{effort}{joint_count}"
+        raise RecordingError(f"{file}: column {missing[0]}{missing[1]} is missing: the file has columns up to {other}")
     return joint_count
 
 

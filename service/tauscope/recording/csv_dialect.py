@@ -24,9 +24,10 @@ _NOT_SEPARATORS = bytes(set(range(256)) - set(b",\n"))
 _NUMBER = re.compile(rb"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 # What programs write where a sample was missed: pandas, R, Excel (German, too) and the C library of Windows.
 _MISSED = re.compile(rb"[+-]?(?:nan(?:\(ind\))?|1\.#(?:IND|QNAN))|-|#?n/?a|#nv|<na>|null|none", re.IGNORECASE)
-_SLASHED_DATE = re.compile(rb"([0-9]{4})/([0-9]{2})/([0-9]{2})[/ T]")
 _DATE = re.compile(rb"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ]|[0-9]{2}:[0-9]{2}:")
 _GERMAN_DATE = re.compile(rb"([0-9]{2})\.([0-9]{2})\.([0-9]{4})[T ]+([0-9]{2}:[0-9]{2}:[0-9]{2}(?:[.,][0-9]+)?)")
+# Dates in other orders and signs, and how they are written by ISO 8601.
+_DATES = {_GERMAN_DATE: rb"\3-\2-\1T\4", re.compile(rb"([0-9]{4})/([0-9]{2})/([0-9]{2})[/ T]"): rb"\1-\2-\3T"}
 _DURATION = re.compile(rb"([0-9]+) days? ([0-9]{2}):([0-9]{2}):([0-9]{2}(?:\.[0-9]+)?)")  # as pandas writes it
 _SHOWN_CHARACTERS = 40
 _ROWS_SEEN = 20  # lines of numbers by which their usual width is told
@@ -104,10 +105,8 @@ class Clock:
         if duration := _DURATION.fullmatch(text):
             days, hours, minutes, seconds = (float(part or 0) for part in duration.groups())
             return ((24.0 * days + hours) * 60.0 + minutes) * 60.0 + seconds
-        if german := _GERMAN_DATE.fullmatch(text):
-            day, month, year, time = german.groups()
-            text = b"%s-%s-%sT%s" % (year, month, day, time.replace(b",", b"."))
-        text = _SLASHED_DATE.sub(rb"\1-\2-\3T", text)
+        for date, iso in _DATES.items():
+            text = date.sub(iso, text)
         if not _DATE.match(text):
             return parse_number(text.removesuffix(b" sec"), file, line, "t")
         try:

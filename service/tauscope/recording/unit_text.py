@@ -60,21 +60,16 @@ def stated_unit(column: str, name: str) -> str | None:
     return next(filter(None, (find_unit(column, text) for text in texts)), texts[-1] if texts else None)
 
 
-_QUANTITIES = {
-    **{"rad": "q", "deg": "q", "mrad": "q", "rev": "q"},
-    **dict.fromkeys(("Nm", "mNm", "Ncm", "Nmm", "kNm", "lbft", "lbin", "ozin"), "tau"),
-    **{"A": "i", "mA": "i"},
-}  # lengths and forces are the tool's, mostly
+_OF_TOOLS = ("m", "cm", "mm", "N", "kN", "drive")  # units of the tool's positions and forces, mostly
 
 
 def find_quantity(name: str) -> str | None:
     """The group whose unit stands in brackets in a name that says nothing else: ``M1 [Nm]``."""
     for text in _BRACKETED.findall(name):
-        for group in ("q", "tau"):
-            if quantity := _QUANTITIES.get(find_unit(group, text) or ""):
-                return quantity
-        if find_unit("qd", text):
-            return "qd"
+        for group in ("q", "tau", "qd"):
+            unit = find_unit(group, text)
+            if unit is not None and (unit not in _OF_TOOLS or group == "qd"):
+                return "i" if unit in ("A", "mA") else group
     return None
 
 

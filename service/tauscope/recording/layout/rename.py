@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from tauscope.errors import RecordingError, RecordingMismatchError
-from tauscope.recording.layout.families import BY_NAME, PLACEHOLDERS, fill_template, names_in
+from tauscope.recording.layout.families import BY_NAME, FROM_ZERO, PLACEHOLDERS, fill_template, names_in
 from tauscope.recording.layout.guess import guess_layout, guess_parts, layout_text
 from tauscope.recording.layout.presets import PRESET_OF
 from tauscope.recording.units import Reading
@@ -148,15 +148,8 @@ class _Mapping:
         if not any(placeholder in template for placeholder in PLACEHOLDERS):
             if template in self._places:
                 return [template]
-            element = next(
-                (
-                    f"{template}[{joint}]"
-                    for joint in ("{0}", BY_NAME)
-                    if names_in(self._header, f"{template}[{BY_NAME}]")
-                ),
-                "",
-            )
-            template = element or template
+            if elements := names_in(self._header, f"{template}[{BY_NAME}]"):
+                template += f"[{FROM_ZERO if elements[0].isdecimal() else BY_NAME}]"
         if BY_NAME in template:
             return self._match_by_name(template)
         if not any(placeholder in template for placeholder in PLACEHOLDERS):
