@@ -90,11 +90,16 @@ def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> str | None:
     if deviation <= SAME_RATIO:
         column = "t" if time != "s" else f"q{joint + 1}" if position not in SI_LENGTHS else f"qd{joint + 1}"
         named = {"t": time, "q": position, "qd": speed}
-        units = [f"{key}={unit}" for key, unit in named.items() if unit not in ("s", "rad", "m")]
+        units = [f"{key}={unit}" for key, unit in named.items() if unit not in ("s", *SI_LENGTHS)]
         if position in ("deg", "mm") and speed in SI_LENGTHS:
             units.append(f"qd={speed}")
-        ratio = " and ".join(_name_foreign_units(time, position, speed))
-        return _doubt(column, f"{evidence}, the ratio of {ratio}", ",".join(units))
+        words = {
+            "t": "s",
+            "q": "m" if position == "mm" else "rad",
+            "qd": "m/s in qd" if speed == "mm" else "rad/s in qd",
+        }
+        ratio = [f"{unit} to {words[key]}" for key, unit in named.items() if unit not in ("s", *SI_LENGTHS)]
+        return _doubt(column, f"{evidence}, the ratio of {' and '.join(ratio)}", ",".join(units))
     if abs(sketch.interval - 1.0) < 1e-9:
         text = f"rises by 1 from row to row, and {evidence}: it counts samples of about {1.0 / typical:.4g} Hz"
         return _doubt("t", text, "t=index --rate HZ")
@@ -117,15 +122,6 @@ def _slope_ratios(sketch: Sketch, others: np.ndarray | None, steady: float = STE
         if middle > 0.0 and high - low < steady * middle:
             ratios[joint] = middle
     return ratios
-
-
-def _name_foreign_units(time: str, position: str, speed: str) -> list[str]:
-    words = (
-        "" if time == "s" else f"{time} to s",
-        "" if position in SI_LENGTHS else f"{position} to {'m' if position == 'mm' else 'rad'}",
-        "" if speed in SI_LENGTHS else f"{speed} to {'m/s' if speed == 'mm' else 'rad/s'} in qd",
-    )
-    return [*filter(None, words)]
 
 
 def _doubt_time(sketch: Sketch) -> str | None:
