@@ -36,10 +36,8 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
     Raises RecordingError, which holds the mapping that the header suggests; RecordingMismatchError for other joints.
     """
     renamed = rename_columns(header, reading, file)
-    counts_rows = reading.units.get("t") == "index" and "t" not in renamed
     try:
-        layout = find_columns(["t", *renamed] if counts_rows else renamed, file, counts_rows=counts_rows)
-        return replace(layout, notes=_note_command(header, renamed))
+        return replace(_find_columns(renamed, reading, file), notes=_note_command(header, renamed))
     except RecordingError as error:
         if reading.columns is not None or isinstance(error, RecordingMismatchError):
             raise
@@ -51,6 +49,11 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
                 require_as_many(header, None, None, reading, file)
             raise RecordingError(f"{error}; {_say_parts(header, reading)}") from error
         raise RecordingError(f"{_say_what_fails(error, header, file)}; {_say_guess(guess, header, reading)}") from error
+
+
+def _find_columns(renamed: Sequence[str], reading: Reading, file: str) -> ColumnLayout:
+    counts_rows = reading.units.get("t") == "index" and "t" not in renamed
+    return find_columns(["t", *renamed] if counts_rows else renamed, file, counts_rows=counts_rows)
 
 
 def _note_command(header: Sequence[str], renamed: Sequence[str]) -> tuple[ResultWarning, ...]:
@@ -129,7 +132,7 @@ def suggest_layout(header: Sequence[str], reading: Reading, file: str) -> Record
         return None
     units = _units_of_tool(header)
     try:
-        layout = find_columns(rename_columns(header, replace(reading, columns=guess), file), file)
+        layout = _find_columns(rename_columns(header, replace(reading, columns=guess), file), reading, file)
     except RecordingError:
         return None
     with suppress(RecordingError):  # who reads the file so is told of units that are not known

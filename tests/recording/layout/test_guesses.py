@@ -70,6 +70,11 @@ def test_an_index_without_a_name_is_the_time(index: str) -> None:
     assert named == {"t": "time", "q": "q{1}", "tau": "tau{1}"}
 
 
+def test_seconds_and_nanoseconds_of_fri() -> None:
+    layout = guess_layout(["time_stamp_sec", "time_stamp_nano_sec", *number("q{1}", "tau{1}")], READING)
+    assert layout == {"t": ["time_stamp_sec", "time_stamp_nano_sec"], "q": "q{1}", "tau": "tau{1}"}
+
+
 def test_repeated_names_as_pandas_numbers_them() -> None:
     layout = guess_layout(["time", "pos", "pos.1", "torque", "torque.1"], READING)
     assert layout == {"t": "time", "q": ["pos", "pos.1"], "tau": ["torque", "torque.1"]}

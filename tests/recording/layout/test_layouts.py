@@ -162,6 +162,19 @@ def test_rows_are_counted_where_a_rate_is_stated(tmp_path: Path) -> None:
     assert np.array_equal(recording.samples().position, Q)
 
 
+def test_without_a_time_the_rate_makes_the_mapping_whole(tmp_path: Path) -> None:
+    header = [f"{name}[{k}]" for name in ("qpos", "effort", "action") for k in range(3)]
+    path = write(tmp_path / "file.csv", header, np.column_stack([Q, TAU, Q]))
+    message = message_of(lambda: read_recording(path, joint_names=JOINTS))
+    assert "without t, and with --units t=index --rate HZ" in message
+    reading = Reading({"t": "index"}, 50.0, joint_names=JOINTS)
+    layout = guess_of(message_of(lambda: read_recording(path, joint_names=JOINTS, reading=reading)))
+    samples = read_recording(path, joint_names=JOINTS, reading=replace(reading, columns=layout.columns)).samples()
+    assert np.allclose(samples.time, np.arange(40) / 50.0)
+    assert np.array_equal(samples.position, Q)
+    assert np.array_equal(samples.effort, TAU)
+
+
 def test_a_preset_of_another_arm_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "file.csv", columns_of(STYLES["rtde"]), np.column_stack([TIME, Q, QD, TAU]))
     message = ""

@@ -22,8 +22,8 @@ _OPTIONAL = ("qd", "qdd", "qref", "taucmd", "temp", "qlink", "volt")
 
 def guess_layout(header: Sequence[str], reading: Reading, preset: str | None = None) -> dict[str, Source] | None:
     """A header's columns; None without positions, efforts or commands, and time. `preset`: a tool, None for any."""
-    found = guess_parts(header, reading, preset)
-    return found if {"t", "q"} <= found.keys() and {"tau", "i", "qref"} & found.keys() else None
+    found, needed = guess_parts(header, reading, preset), {"q"} if reading.units.get("t") == "index" else {"t", "q"}
+    return found if needed <= found.keys() and {"tau", "i", "qref"} & found.keys() else None
 
 
 def guess_parts(header: Sequence[str], reading: Reading, preset: str | None = None) -> dict[str, Source]:
@@ -119,7 +119,7 @@ def _add_nanoseconds(header: Sequence[str], time: str) -> Source:
     if header.count(time) > 1:  # each signal has its own time
         return header.index(time) + 1
     match = _WHOLE_SECONDS.fullmatch(time)
-    names = [f"{match[1]}{name}" for name in ("nanosec", "nsec", "nsecs")] if match else []
+    names = [f"{match[1]}{name}" for name in ("nanosec", "nsec", "nsecs", "nano_sec")] if match else []
     return next(([time, name] for name in names if name in header), time)
 
 
