@@ -48,7 +48,10 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
             if not is_numbered(header):
                 require_as_many(header, None, None, reading, file)
             raise RecordingError(f"{error}; {_say_parts(header, reading)}") from error
-        raise RecordingError(f"{_say_what_fails(error, header, file)}; {_say_guess(guess, header, reading)}") from error
+        what = f"{file}: the first row holds numbers where the column names are expected"
+        raise RecordingError(
+            f"{what if is_numbered(header) else error}; {_say_guess(guess, header, reading)}"
+        ) from error
 
 
 def _find_columns(renamed: Sequence[str], reading: Reading, file: str) -> ColumnLayout:
@@ -151,12 +154,6 @@ def _units_of_tool(header: Sequence[str]) -> Mapping[str, str]:
 def _is_ours(header: Sequence[str]) -> bool:
     """Whether columns have the names of CONTRACT.md, so that no mapping is missing."""
     return "t" in header and "q1" in header
-
-
-def _say_what_fails(error: RecordingError, header: Sequence[str], file: str) -> str:
-    if is_numbered(header):
-        return f"{file}: the first row holds numbers where the column names are expected"
-    return str(error)
 
 
 def _say_guess(guess: RecordingLayout, header: Sequence[str], reading: Reading) -> str:

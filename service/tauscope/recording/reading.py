@@ -2,7 +2,7 @@
 
 import errno
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -190,10 +190,9 @@ def _suggest(header: Sequence[str], reading: Reading) -> ColumnMapping:
     if reading.columns is None:
         guess = suggest_layout(header, reading, "") or RecordingLayout(columns=guess_parts(header, reading))
         reading = replace(reading, columns=guess.columns, units={**guess.units, **reading.units})
-    try:
+    renamed: Sequence[str] = ()
+    with suppress(RecordingError):
         renamed = rename_columns(header, reading, "")
-    except RecordingError:
-        renamed = ()
     columns = {target: name for target, name in zip(renamed, header, strict=False) if is_column(target)}
     return ColumnMapping(tuple(header), columns, _complete_units(reading.units, columns), is_guessed=True)
 
