@@ -30,7 +30,6 @@ DESCRIPTIONS: dict[str, Callable[[], str]] = {
     "limits in rad": lambda: scale("(?:lower|upper)", 57.3),
     "lengths in m": lambda: scale("<origin xyz", 1000.0),
     "masses in kg": lambda: scale("<mass value", 1000.0),
-    "inertias in kg m²": lambda: scale("i[xyz]{2}", 1e6),
 }
 
 

@@ -133,23 +133,20 @@ def _list(vector: Array) -> str:
 
 MOST_TURNS, LONGEST_CHAIN = 4.0, 20.0  # of a limited revolute joint, either way, and of an arm [m]
 DENSEST, SHORTEST = 5000.0, 0.3  # mass by the cube of the reach [kg/m³], of an arm of this length at least [m]
-FARTHEST_MASS = 5.0  # radius of gyration over the reach
 
 
 def doubt_units(robot: Robot, label: str) -> tuple[ResultWarning, ...]:
-    """Limits in degrees, lengths in mm, masses in g, and inertias in g mm², as drawing programs write them."""
+    """Limits in degrees, lengths in mm and masses in g, as drawing programs write them."""
     parts = [part.translation for each in robot.segments for part in (each.before, each.after)]
     reach = float(np.linalg.norm(parts, axis=1).sum())
-    size, links = max(reach, SHORTEST), [link for link in robot.model.links or () if link.mass > 0.0]
+    size = max(reach, SHORTEST)
     limits = [joint.limits.position or (0.0, 0.0) for joint in robot.joints if joint.type is JointType.REVOLUTE]
     turns = max((max(map(abs, limit)) / (2.0 * np.pi) for limit in limits), default=0.0)
-    gyration = max((np.sqrt(np.linalg.eigvalsh(link.inertia)[-1] / link.mass) for link in links), default=0.0)
-    mass = sum(link.mass for link in links)
+    mass = sum(link.mass for link in robot.model.links or ())
     doubts = (
         (turns > MOST_TURNS, f"a revolute joint is limited to {turns:.4g} turns", "limits in rad"),
         (reach > LONGEST_CHAIN, f"the chain is {reach:.4g} m long", "lengths in m"),
         (mass > DENSEST * size**3, f"an arm of {reach:.3g} m weighs {mass:.4g} kg", "masses in kg"),
-        (gyration > FARTHEST_MASS * size, f"a link has its mass {gyration:.3g} m from its frame", "inertias in kg m²"),
     )
     return tuple(
         ResultWarning(
