@@ -36,6 +36,57 @@ def test_numpy_archives(tmp_path: Path, saves: Callable[..., None]) -> None:
     assert "not a readable NumPy archive" in message_of(lambda: read(path, read_layout("mujoco")))
 
 
+SHAPES = {
+    "a sample a column": {"time": TIME, "q": Q.T, "tau": TAU.T},
+    "gains and limits beside": {
+        "time": TIME,
+        "q": Q,
+        "tau": TAU.T,
+        **dict.fromkeys(("kp", "kd", "low", "high"), [1.0] * 3),
+    },
+    "one environment of several": {"time": TIME, "q": Q[:, None], "tau": TAU[:, None]},
+    "samples last, as Simulink has them": {"tout": TIME, "q": Q.T[:, None], "tau": TAU.T[:, None]},
+    "a column of time": {"time": TIME[:, None], "q": Q, "tau": TAU},
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_arrays_may_have_any_axis_of_samples(tmp_path: Path, name: str) -> None:
+    arrays = {key: np.asarray(array) for key, array in SHAPES[name].items()}
+    np.savez(tmp_path / "log.npz", **arrays, allow_pickle=False)
+    guess = guess_of(message_of(lambda: read_recording(tmp_path / "log.npz", joint_names=JOINTS)))
+    assert np.array_equal(rows_of(read(tmp_path / "log.npz", guess, JOINTS)), ROWS)
+
+
+@pytest.mark.parametrize("is_wide", [True, False])
+@pytest.mark.parametrize("suffix", [".npy", ".npz", ".mat", ".json"])
+def test_a_matrix_alone_has_numbered_columns(tmp_path: Path, suffix: str, is_wide: bool) -> None:
+    path, matrix = tmp_path / f"log{suffix}", ROWS.T if is_wide else ROWS
+    if suffix == ".npy":
+        np.save(path, matrix)
+    elif suffix == ".npz":
+        np.savez(path, data=matrix)
+    elif suffix == ".mat":
+        savemat(path, {"data": matrix})
+    else:
+        path.write_text(json.dumps(matrix.tolist()), encoding="utf-8")
+    guess = guess_of(message_of(lambda: read_recording(path, joint_names=JOINTS)))
+    assert guess.columns == {"t": 1, "q": [2, 3, 4], "tau": [5, 6, 7]}
+    assert np.array_equal(rows_of(read(path, guess, JOINTS)), ROWS)
+
+
+def test_names_of_columns_beside_a_matrix_or_in_it(tmp_path: Path) -> None:
+    names = ["t", "q1", "q2", "q3", "tau1", "tau2", "tau3"]
+    np.savez(tmp_path / "log.npz", data=ROWS, columns=np.array(names))
+    np.save(tmp_path / "log.npy", np.array([*map(tuple, ROWS)], dtype=[(name, float) for name in names]))
+    frame = {
+        name: {str(row): value for row, value in enumerate(column)} for name, column in zip(names, ROWS.T, strict=True)
+    }
+    (tmp_path / "log.json").write_text(json.dumps(frame), encoding="utf-8")  # as pandas writes a table
+    for file in ("log.npz", "log.npy", "log.json"):
+        assert np.array_equal(rows_of(read_recording(tmp_path / file)), ROWS)
+
+
 @pytest.mark.parametrize("is_compressed", [True, False])
 def test_matlab_files(tmp_path: Path, is_compressed: bool) -> None:
     path = tmp_path / "log.mat"

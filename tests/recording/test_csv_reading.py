@@ -178,6 +178,7 @@ BAD = {
     ),
     "NUL": (field_changed(17, "q1", "1\0"), "line 17 holds a NUL byte"),
     "NUL in the header": (changed(1, "t\0" + LINES[0]), "line 1 holds a NUL byte"),
+    "echo of a topic": ("header:\n  stamp:\n", "is text of `ros2 topic echo`; record a bag, or echo with --csv"),
     "UTF-16": ("\n".join(LINES).encode("utf-16"), "is UTF-16 text; save it as UTF-8"),
     "long line": (changed(17, "1," + "2" * 2**21), "line 17 has"),
     "long header": ("t" * 2**21, "line 1 has more than 1048576 characters"),
@@ -372,3 +373,44 @@ def test_a_row_that_comes_nine_rows_early_is_refused_wherever_blocks_end(tmp_pat
     assert "column t: time runs backwards" in message_of(lambda: read(tmp_path, "\n".join(lines)))
     assert "column t: time runs backwards" in message_of(lambda: read(tmp_path, "\n".join(lines) + "\n"))
     assert len(read(tmp_path, "\n".join(lines[:-1]) + "\n")) == 14
+
+
+HEADS = {
+    "counts of channels and samples": "Samples;40;40\nChannels;4;4\n",
+    "lines of two words": "Robot;RR\nVersion;1;2\n\n",
+}
+
+
+@pytest.mark.parametrize("name", HEADS)
+def test_lines_before_the_names_may_hold_numbers(tmp_path: Path, name: str) -> None:
+    assert np.array_equal(rows_of(read(tmp_path, HEADS[name] + csv_text().replace(",", ";"))), ROWS)
+
+
+def test_a_file_of_labview(tmp_path: Path) -> None:
+    head = "LabVIEW Measurement\t\nDecimal_Separator\t.\n***End_of_Header***\t\n\nSamples\t40\t40\nX0\t0.0\t0.0\n"
+    text = csv_text().replace(",", "\t").replace("tau2", "tau2\tComment", 1)
+    assert np.array_equal(rows_of(read(tmp_path, head + text)), ROWS)
+
+
+def test_a_header_of_matlab(tmp_path: Path) -> None:
+    assert np.array_equal(rows_of(read(tmp_path, "% " + csv_text().replace(",", " "))), ROWS)
+
+
+def test_dates_with_slashes(tmp_path: Path) -> None:
+    dates = [f"2026/03/01/10:00:{row[0]:09.6f}" for row in ROWS]
+    lines = [LINES[0], *(date + line[line.index(",") :] for date, line in zip(dates, LINES[1:], strict=True))]
+    assert np.allclose(rows_of(read(tmp_path, "\n".join(lines) + "\n")), ROWS)
+
+
+@pytest.mark.parametrize("separator", [" ", ", ", "; "])
+def test_lists_in_cells(tmp_path: Path, separator: str) -> None:
+    cells = [
+        [repr(row[0]), *(f'"[{separator.join(map(repr, row[k : k + 2]))}]"' for k in (1, 3))] for row in ROWS.tolist()
+    ]
+    (tmp_path / "file.csv").write_text("\n".join(["t,q,tau", *map(",".join, cells)]) + "\n", encoding="utf-8")
+    reading = Reading(columns={"t": "t", "q": "q", "tau": "tau"})
+    assert np.array_equal(rows_of(read_recording(tmp_path / "file.csv", reading=reading)), ROWS)
+    bare = [line.replace("[", "").replace("]", "") for line in map(",".join, cells)]
+    (tmp_path / "file.csv").write_text("\n".join(["t,q,tau", *bare]) + "\n", encoding="utf-8")
+    if separator == " ":
+        assert np.array_equal(rows_of(read_recording(tmp_path / "file.csv", reading=reading)), ROWS)

@@ -58,6 +58,9 @@ def test_dates_become_seconds_from_the_first_row(tmp_path):
     stamps = (1_700_000_000_000 + np.arange(40)).astype("datetime64[ms]")
     samples = read_parquet(write(tmp_path, edited(t=stamps)), Choice("x")).samples()
     np.testing.assert_allclose(samples.time, np.arange(40) * 1e-3, atol=1e-12)
+    durations = np.arange(40).astype("timedelta64[ms]")
+    samples = read_parquet(write(tmp_path, edited(t=durations)), Choice("x")).samples()
+    np.testing.assert_allclose(samples.time, np.arange(40) * 1e-3, atol=1e-12)
 
 
 def edited(**changes):

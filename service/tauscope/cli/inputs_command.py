@@ -102,7 +102,7 @@ def map_file(
     arm = None if robot is None else read_robot(robot)
     reading = Reading().for_robot(arm)
     header = read_header(file)
-    layout = guess_parts(header, reading.joint_names, prefers_torque=reading.prefers_torque)
+    layout = RecordingLayout(columns=guess_parts(header, reading))
     if sys.stdin.isatty() if ask is None else ask:
         typer.echo(f"columns: {listed(header)}", err=True)
         layout = _ask(layout)

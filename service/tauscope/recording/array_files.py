@@ -18,15 +18,15 @@ from tauscope.recording.column_files import ROWS_AT_ONCE, Batch, read_batches
 from tauscope.recording.columns import ColumnLayout
 from tauscope.recording.inflation import HELD_BYTES, require_plausible_inflation
 from tauscope.recording.intake import Choice
+from tauscope.recording.layout.families import is_name_list
 from tauscope.recording.recording import Array, Recording
 from tauscope.robot.messages import listed, reason
 
-ZIP_MAGIC, MATLAB_MAGIC = b"PK\x03\x04", b"MATLAB 5.0"
-JSON_START = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:\[\s*)?\{")  # an object, or a list of them
+MAGICS = ZIP_MAGIC, NUMPY_MAGIC, MATLAB_MAGIC = b"PK\x03\x04", b"\x93NUMPY", b"MATLAB 5.0"
+JSON_START = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:(?:\[\s*)?\{|\[\s*\[)")  # an object, or a list of them or of lists
 
 _MOST_COLUMNS = 10_000
 _LARGEST_JSON_BYTES = 2**28  # a short number takes eight times its text in memory
-_NAMES = ("name", "names", "joint_names")  # what messages call the list of joints that the others follow
 _COMPRESSED = 15  # type of an element of a MATLAB file
 _MATLAB_HEADER_BYTES = 128
 # Errors that damaged archives raise; NumPy reads the header of an array as Python.
@@ -56,19 +56,21 @@ def read_arrays_header(path: Path, name: str) -> list[str]:
 def _read_columns(path: Path, name: str) -> dict[str, Array]:
     with path.open("rb") as file:
         magic = file.read(len(MATLAB_MAGIC))
-    is_zip = magic.startswith(ZIP_MAGIC)
-    kind = "NumPy archive" if is_zip else "MATLAB file" if magic == MATLAB_MAGIC else "JSON file"
+    read, kind = next((entry for start, entry in _READERS.items() if magic.startswith(start)), (None, "JSON file"))
     try:
-        if kind == "JSON file":
-            return _read_json(path, name)
-        return _join_arrays(_read_npz(path, name) if is_zip else _read_matlab(path, name), name)
+        return _read_json(path, name) if read is None else _join_arrays(read(path, name), name)
     except _UNREADABLE as error:
         if isinstance(error, RecordingError):
             raise
-        if is_zip and path.suffix.lower() != ".npz":
+        if magic.startswith(ZIP_MAGIC) and path.suffix.lower() != ".npz":
             hint = "unpack it, or export the sheet as CSV"
             raise RecordingError(f"{name}: is a zip archive or a spreadsheet; {hint}") from error
         raise RecordingError(f"{name}: not a readable {kind} ({reason(error)})") from error
+
+
+def _read_npy(path: Path, _name: str) -> dict[str, Any]:
+    array = np.load(path, allow_pickle=False)
+    return {key: array[key] for key in array.dtype.names or ()} or {"array": array}
 
 
 def _read_npz(path: Path, name: str) -> dict[str, Any]:
@@ -93,6 +95,13 @@ def _read_matlab(path: Path, name: str) -> dict[str, Any]:
     return {key: array for key, array in found if isinstance(array, np.ndarray)}
 
 
+_READERS = {
+    ZIP_MAGIC: (_read_npz, "NumPy archive"),
+    NUMPY_MAGIC: (_read_npy, "NumPy file"),
+    MATLAB_MAGIC: (_read_matlab, "MATLAB file"),
+}
+
+
 def _unpack_matlab(content: bytes) -> Iterator[bytes]:
     """Compressed elements of a MATLAB file, unpacked piece by piece."""
     order, at = "<" if content[126:128] == b"IM" else ">", _MATLAB_HEADER_BYTES
@@ -107,7 +116,9 @@ def _unpack_matlab(content: bytes) -> Iterator[bytes]:
 
 
 def _flatten(value: Any, name: str) -> Iterator[tuple[str, Any]]:
-    """Arrays and lists in structures by their whole names, ``log.q``."""
+    """Arrays and lists in structures by their whole names, ``log.q``; numbered entries are those of a list."""
+    if isinstance(value, Mapping) and value and all(str(key).isdecimal() for key in value):
+        value = list(value.values())
     if isinstance(value, Mapping):
         for key, each in value.items():
             if not str(key).startswith("__"):
@@ -117,25 +128,31 @@ def _flatten(value: Any, name: str) -> Iterator[tuple[str, Any]]:
 
 
 def _join_arrays(arrays: Mapping[str, Any], name: str) -> dict[str, Array]:
-    """Columns of the arrays with as many rows as most of them."""
-    tables = {key: array for key, array in arrays.items() if array.dtype.kind in "fiu" and array.ndim in (1, 2)}
-    samples = {len(array) for array in tables.values() if array.ndim == 1}
-    for key, array in tables.items():  # arrays may have a column a sample
-        if array.ndim == 2 and array.shape[1] in samples and len(array) not in samples:
-            tables[key] = array.T
-    tables = {key: array for key, array in tables.items() if array[:1].size <= _MOST_COLUMNS}
-    lengths = [len(array) for array in tables.values()]
+    """Columns of the arrays with as many rows as most of them, named by lists of as many names as they have columns.
+
+    An array may have a column a sample. Arrays no longer than another is wide hold parameters.
+    """
+    shaped = {key: np.squeeze(array) for key, array in arrays.items()}
+    tables = {key: array for key, array in shaped.items() if array.dtype.kind in "fiu" and array.ndim in (1, 2)}
+    width = max((min(array.shape) for array in tables.values() if array.ndim == 2), default=0)
+    known = {len(array) for array in tables.values() if array.ndim == 1 and len(array) > width}
+    lengths = [next(filter(known.__contains__, array.shape), max(array.shape)) for array in tables.values()]
     if not lengths:
         raise RecordingError(
             f"{name}: no array holds a row a sample; the arrays are {listed(list(arrays)) or 'numbers'}"
         )
-    rows = max(set(lengths), key=lengths.count)
+    rows = max((length for length in lengths if length > width or len(lengths) == 1), key=lengths.count)
+    lists = [array.tolist() for key, array in shaped.items() if is_name_list(key) and array.ndim == 1]
+    is_alone = len(tables) == 1  # then its columns need no other name
     columns: dict[str, Array] = {}
     for key, array in tables.items():
-        if len(array) == rows:
-            values = array.astype(np.float64).reshape(rows, -1)
-            names = [key] if array.ndim == 1 else [f"{key}[{index}]" for index in range(values.shape[1])]
-            columns |= dict(zip(names, values.T, strict=True))
+        values = array if len(array) == rows else array.T
+        if len(values) != rows or values[0].size > _MOST_COLUMNS:
+            continue
+        numbers = range(is_alone, values[0].size + is_alone)
+        elements = next((names for names in lists if len(set(names)) == values[0].size), numbers)
+        named = [key] if array.ndim == 1 else [str(each) if is_alone else f"{key}[{each}]" for each in elements]
+        columns |= dict(zip(named, values.astype(np.float64).reshape(rows, -1).T, strict=True))
     return columns
 
 
@@ -144,7 +161,7 @@ def _read_json(path: Path, name: str) -> dict[str, Array]:
     if path.stat().st_size > _LARGEST_JSON_BYTES:
         raise RecordingError(f"{name}: is JSON of more than {_LARGEST_JSON_BYTES >> 20} MiB; save it as CSV or Parquet")
     content = _parse_json(path.read_bytes().removeprefix(b"\xef\xbb\xbf"), name)
-    if isinstance(content, list):
+    if isinstance(content, list) and not isinstance(content[0], list):
         return _join_records(content, path, name)
     lists = {key: value for key, value in _flatten(content, "") if isinstance(value, list) and value}
     records = next((value for value in lists.values() if isinstance(value[0], dict)), None)
@@ -169,8 +186,8 @@ def _parse_json(text: bytes, name: str) -> Any:
 
 def _make_array(value: Any) -> Array | None:
     try:
-        return np.array(value, dtype=np.float64)
-    except (ValueError, TypeError):  # texts, or lists of different lengths
+        return np.array(value, dtype=str if isinstance(value[0], str) else np.float64)
+    except (ValueError, TypeError):  # objects, or lists of different lengths
         return None
 
 
@@ -192,7 +209,7 @@ def _join_records(records: Iterable[Any], path: Path, name: str) -> dict[str, Ar
 def _find_numbers(value: Any, name: str) -> Iterator[tuple[str, float]]:
     """Numbers of an object by their whole names: ``state.position[elbow]`` where it names its joints, else by place."""
     if isinstance(value, dict):
-        joints = next((value[key] for key in _NAMES if isinstance(value.get(key), list)), [])
+        joints = next((each for key, each in value.items() if is_name_list(key) and isinstance(each, list)), [])
         for key, each in value.items():
             inner = f"{name}.{key}" if name else key
             if isinstance(each, list):

@@ -16,6 +16,7 @@ from tauscope.extras import require_extra
 from tauscope.recording.columns import ColumnLayout, require_joint_count
 from tauscope.recording.inflation import require_plausible_inflation
 from tauscope.recording.intake import Choice, EpisodeClock, RowIntake, SplitClock
+from tauscope.recording.layout.families import is_name_list
 from tauscope.recording.mapping import find_layout
 from tauscope.recording.recording import Array, Recording
 from tauscope.recording.units import SECONDS
@@ -80,6 +81,7 @@ def unfold_columns(arrow: Any, file: Any, path: Path, name: str) -> dict[str, Fi
     """Columns by name, ``observation.state[0]`` or ``state[elbow.pos]``. Raises RecordingError for one twice."""
     found: dict[str, FileColumn] = {}
     schema, elements = file.schema_arrow, _element_names(path)
+    lists = [_first(file, column) for column in map(str, schema.names) if is_name_list(column)]
     for column in map(str, schema.names):
         if column in found:
             raise RecordingError(f"{name}: column {column} appears twice; rename or delete one")
@@ -91,9 +93,9 @@ def unfold_columns(arrow: Any, file: Any, path: Path, name: str) -> dict[str, Fi
         if not _is_list(arrow, kind):
             found[column] = FileColumn(column)
             continue
-        width = _width(arrow, file, column)
-        names = elements.get(column, ())
-        names = names if len(names) == width else [str(index) for index in range(width)]
+        width = min(len(_first(file, column)), _MOST_ELEMENTS)
+        known = (names for names in (elements.get(column, ()), *lists) if len(set(names)) == len(names) == width)
+        names = next(known, [str(index) for index in range(width)])
         found |= {f"{column}[{element}]": FileColumn(column, index) for index, element in enumerate(names)}
     return found
 
@@ -112,13 +114,13 @@ def _is_list(arrow: Any, kind: Any) -> bool:
     return is_list and (types.is_floating(kind.value_type) or types.is_integer(kind.value_type))
 
 
-def _width(arrow: Any, file: Any, column: str) -> int:
-    """Elements of the first list; a later one that is shorter is refused as it is read."""
+def _first(file: Any, column: str) -> Sequence[Any]:
+    """The first list of a column; a later one that is shorter is refused as it is read."""
     for batch in file.iter_batches(batch_size=1, columns=[column]):
-        length = arrow.compute.list_value_length(batch.column(0))[0].as_py()
-        if length is not None:
-            return min(length, _MOST_ELEMENTS)
-    return 0
+        value = batch.column(0)[0].as_py()
+        if isinstance(value, list):
+            return value
+    return ()
 
 
 def _element_names(path: Path) -> Mapping[str, Sequence[str]]:
@@ -137,8 +139,7 @@ def _element_names(path: Path) -> Mapping[str, Sequence[str]]:
 def _names(names: Any) -> Sequence[str]:
     while isinstance(names, dict):
         names = next(iter(names.values()), None)
-    is_named = isinstance(names, list) and all(isinstance(name, str) for name in names)
-    return names if is_named and len(set(names)) == len(names) else ()
+    return names if isinstance(names, list) and all(isinstance(name, str) for name in names) else ()
 
 
 PARQUET_MAGIC = b"PAR1"
@@ -174,7 +175,7 @@ def _take_batches(
     for batch in batches:
         stamps = take_column(arrow, batch, time)
         if _is_stamp(stamps.type):
-            stamps = stamps.cast("timestamp[ns]", safe=False).cast("int64")
+            stamps = stamps.cast(f"{str(stamps.type).partition('[')[0]}[ns]", safe=False).cast("int64")
             first_stamp = next((stamp.as_py() for stamp in stamps), 0) if first_stamp is None else first_stamp
             since = arrow.compute.subtract(stamps, first_stamp or 0)
             stamps = arrow.compute.multiply(since.cast("float64"), 1e-9)
@@ -234,4 +235,4 @@ def _require_numbers(schema: Any, wanted: Sequence[FileColumn], layout: ColumnLa
 
 
 def _is_stamp(kind: Any) -> bool:
-    return str(kind).startswith("timestamp[")
+    return str(kind).startswith(("timestamp[", "duration["))

@@ -75,10 +75,12 @@ def require_joint_count(found: int, expected: int | None, file: str) -> None:
     """Refuse a recording of another robot. Raises RecordingMismatchError."""
     if expected is None or found == expected:
         return
-    fault = f"column q{found + 1} is missing" if found < expected else f"column q{expected + 1} belongs to no joint"
+    fault, way_out = f"column q{expected + 1} belongs to no joint", ""
+    if found < expected:
+        fault, way_out = f"column q{found + 1} is missing", ", or a robot file that states the others as locked"
     raise RecordingMismatchError(
         f"{file}: the recording has {counted(found, 'joint')}, the robot has {counted(expected, 'joint')}: {fault}; "
-        "give the robot file and the recording of the same arm"
+        f"give the robot file and the recording of the same arm{way_out}"
     )
 
 
@@ -113,12 +115,10 @@ def _joint_count(joints: dict[str, list[int]], effort_kind: EffortKind, header: 
             f" stated actuator makes it; the columns are {listed(header)}"
         )
     joint_count = max(joints["q"][-1], joints[effort][-1])
-    for prefix in ("q", effort):
-        present = set(joints[prefix])
-        for joint in range(1, joint_count + 1):
-            if joint not in present:
-                other = f"q{joint_count}" if joint_count in joints["q"] else f"{effort}{joint_count}"
-                raise RecordingError(f"{file}: column {prefix}{joint} is missing: the file has columns up to {other}")
+    every = ((prefix, joint) for prefix in ("q", effort) for joint in range(1, joint_count + 1))
+    if missing := next(((prefix, joint) for prefix, joint in every if joint not in joints[prefix]), None):
+        other = f"q{joint_count}" if joint_count in joints["q"] else f"{effort}{joint_count}"
+        raise RecordingError(f"{file}: column {missing[0]}{missing[1]} is missing: the file has columns up to {other}")
     return joint_count
 
 

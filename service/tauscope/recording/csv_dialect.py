@@ -16,6 +16,7 @@ import numpy as np
 from pydantic_core import from_json
 
 from tauscope.errors import RecordingError
+from tauscope.recording.layout.families import is_name_list
 from tauscope.recording.samples import Array
 
 _NUMBER_BYTES = b"0123456789+-.eE \tnaN"
@@ -25,8 +26,11 @@ _NUMBER = re.compile(rb"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)
 _MISSED = re.compile(rb"[+-]?(?:nan(?:\(ind\))?|1\.#(?:IND|QNAN))|-|#?n/?a|#nv|<na>|null|none", re.IGNORECASE)
 _DATE = re.compile(rb"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ]|[0-9]{2}:[0-9]{2}:")
 _GERMAN_DATE = re.compile(rb"([0-9]{2})\.([0-9]{2})\.([0-9]{4})[T ]+([0-9]{2}:[0-9]{2}:[0-9]{2}(?:[.,][0-9]+)?)")
+# Dates in other orders and signs, and how they are written by ISO 8601.
+_DATES = {_GERMAN_DATE: rb"\3-\2-\1T\4", re.compile(rb"([0-9]{4})/([0-9]{2})/([0-9]{2})[/ T]"): rb"\1-\2-\3T"}
 _DURATION = re.compile(rb"([0-9]+) days? ([0-9]{2}):([0-9]{2}):([0-9]{2}(?:\.[0-9]+)?)")  # as pandas writes it
 _SHOWN_CHARACTERS = 40
+_ROWS_SEEN = 20  # lines of numbers by which their usual width is told
 
 
 def parse_quickly(text: bytes, delimiter: bytes, width: int, source: Sequence[int]) -> Array | None:
@@ -101,9 +105,8 @@ class Clock:
         if duration := _DURATION.fullmatch(text):
             days, hours, minutes, seconds = (float(part or 0) for part in duration.groups())
             return ((24.0 * days + hours) * 60.0 + minutes) * 60.0 + seconds
-        if german := _GERMAN_DATE.fullmatch(text):
-            day, month, year, time = german.groups()
-            text = b"%s-%s-%sT%s" % (year, month, day, time.replace(b",", b"."))
+        for date, iso in _DATES.items():
+            text = date.sub(iso, text)
         if not _DATE.match(text):
             return parse_number(text.removesuffix(b" sec"), file, line, "t")
         try:
@@ -181,16 +184,17 @@ class Dialect:
         return [field.strip(b' \t\r"') for field in self.normalize(line).split(self.separator)]
 
     def name_fields(self, header: bytes, row: bytes) -> list[bytes]:
-        """Names of a row's fields: a name whose cell is a list stands for its elements, numbered from 0."""
+        """Names of a row's fields: a name whose cell is a list stands for its elements, by joint or numbered from 0."""
         names, cells = self._cells(header), self._cells(row)
         if len(names) != len(cells):
             return [name.strip().encode("latin-1") for name in names]
+        lists = [_TEXT.findall(cell) for name, cell in zip(names, cells, strict=True) if is_name_list(name.strip())]
         found = []
         for name, cell in zip(names, cells, strict=True):
-            text = name.strip().encode("latin-1")
-            elements = range(len(_elements(cell)))
-            found += [b"%s[%d]" % (text, element) for element in elements] if _is_list(cell) else [text]
-        return found
+            text, count = name.strip(), len(_elements(cell))
+            elements = next((joints for joints in lists if len(set(joints)) == count), range(count))
+            found += [f"{text}[{element}]" for element in elements] if _is_list(cell) else [text]
+        return [name.encode("latin-1") for name in found]
 
     def shows_decimal_comma(self, lines: Sequence[bytes]) -> bool:
         """Whether lines of numbers write decimals with a comma: some do, and none has a point."""
@@ -207,7 +211,7 @@ class Dialect:
         return commas and all(_THOUSANDS[True].fullmatch(field.strip()) for field in points)
 
     def _open_cells(self, line: bytes) -> bytes:
-        if line.lstrip().startswith(b"#"):
+        if is_comment(line):
             return line
         fields = [field.encode("latin-1") for cell in self._cells(line.rstrip(b"\r")) for field in _elements(cell)]
         fields = [_THOUSANDS[self.has_decimal_comma].sub(_join_thousands, field) for field in fields]
@@ -224,35 +228,52 @@ class Dialect:
         return [cell for cell in cells if cell] if sign == " " else cells
 
 
+_TEXT = re.compile(r"""['"]([^'"]+)['"]""")
+
+
 def _join_thousands(number: re.Match[bytes]) -> bytes:
     return number[0].translate(None, b".,")
 
 
+_LIST = re.compile(r"\s*[\[({](.*)[\])}]\s*", re.DOTALL)
+
+
 def _is_list(cell: str) -> bool:
-    """Whether a cell is a list of numbers in brackets; ``[rad]`` is none."""
-    text = cell.strip()
-    first = text[1:].replace(",", " ").split()[:1]
-    return (
-        text.startswith("[") and text.endswith("]") and bool(first) and is_number(first[0].encode("latin-1", "replace"))
-    )
+    """Whether a cell is a list of numbers, in brackets or between blanks; ``[rad]`` is none."""
+    return _elements(cell) != [cell]
 
 
 def _elements(cell: str) -> list[str]:
-    return cell.strip()[1:-1].replace(",", " ").split() if _is_list(cell) else [cell]
+    """Numbers of a list; else the cell."""
+    bracketed = _LIST.fullmatch(cell)
+    elements = cell.split() if bracketed is None else re.split(r"[\s,;]+", bracketed[1].strip(" \t,;"))
+    is_list = all(is_number(each.encode("latin-1", "replace")) for each in elements[: None if bracketed is None else 1])
+    return elements if is_list and (bracketed or len(elements) > 1) else [cell]
 
 
 def find_first_row(lines: Sequence[bytes], sign: bytes | None) -> tuple[int, Dialect] | None:
-    """The first line of numbers and its dialect, by `sign` or as the lines show it; None where there is none."""
+    """The first of the lines of numbers that are as wide as most, and its dialect, by `sign` or as the lines show it.
+
+    None where there is none. Lines of numbers before them, such as a count of the channels, are shorter.
+    """
+    rows: list[tuple[int, int, Dialect]] = []
     for index, line in enumerate(lines):
-        if line.strip().startswith(b"#"):
+        if is_comment(line):
             continue
-        delimiter = find_delimiter(line) if sign is None else sign
-        dialect = Dialect(delimiter)
+        dialect = Dialect(find_delimiter(line) if sign is None else sign)
         fields = replace(dialect, has_decimal_comma=dialect.shows_decimal_comma([line])).split(line)
-        numbers = sum(map(is_number, fields))
-        if len(fields) > 2 and 2 * numbers > len(fields):
-            return index, dialect
-    return None
+        if len(fields) > 2 and 2 * sum(map(is_number, fields)) > len(fields):
+            rows.append((len(fields), index, dialect))
+        if len(rows) == _ROWS_SEEN:
+            break
+    widths = [width for width, _, _ in rows]
+    width = max(widths, key=lambda width: (widths.count(width), width), default=0)
+    return next(((index, dialect) for found, index, dialect in rows if found == width), None)
+
+
+def is_comment(line: bytes) -> bool:
+    """Whether a line is for people: ``# …``, or ``% …`` as MATLAB writes it."""
+    return line.lstrip().startswith((b"#", b"% "))
 
 
 def _has_cells(text: bytes) -> bool:

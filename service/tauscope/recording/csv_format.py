@@ -24,6 +24,7 @@ _LONGEST_LINE_BYTES = 2**20
 _ROWS_WRITTEN_AT_ONCE = 8192
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _SAMPLE_BYTES = 2**16
+_REMARKS = b"Comment"  # last column of LabVIEW's files, which rows without a remark lack
 
 
 def read_csv(path: Path, choice: Choice) -> Recording:
@@ -139,7 +140,7 @@ def _read_names(file: BinaryIO, name: str, reading: Reading) -> _Names:
         _require_text(line, number, name)
         if not _is_empty(line):
             return _parse_names(file, line.strip(b"\r\n"), number, at, comment, name, reading)
-        comment = line.strip(b"\r\n\t #") or comment
+        comment = line.strip(b"\r\n\t #%") or comment
         at = file.tell()
     raise RecordingError(f"{name}: the file is empty; expected a header line with the columns t, q1…, tau1…")
 
@@ -177,7 +178,7 @@ def _parse_names(
         cells = rows.split(row)
         if len(cells) == len(fields) + 1 and not cells[-1]:  # a delimiter ends the rows, and not the header
             fields.append(b"")
-        elif len(fields) == len(cells) + 1 and not fields[-1]:
+        elif len(fields) == len(cells) + 1 and fields[-1] in (b"", _REMARKS):
             fields.pop()
     file.seek(start)
     return _Names(number, rows, [_decode(field) for field in fields])
@@ -186,8 +187,11 @@ def _parse_names(
 def _find_header(lines: Sequence[bytes], row: bytes, dialect: csv_dialect.Dialect) -> int | None:
     """The first line with as many names as the row has fields; lines before it say something else."""
     cells = len(dialect.split(row))
-    named = (not _is_empty(line) and len(dialect.name_fields(line, row)) == cells for line in lines)
-    return next((index for index, is_header in enumerate(named) if is_header), None)
+    for index, line in enumerate(lines):
+        names = [] if _is_empty(line) else dialect.name_fields(line, row)
+        if len(names) - (names[-1:] == [_REMARKS]) == cells or len(names) == cells:
+            return index
+    return None
 
 
 def _join_names(upper: Sequence[bytes], lower: Sequence[bytes]) -> list[bytes] | None:
@@ -302,5 +306,4 @@ def _require_text(line: bytes, number: int, name: str) -> None:
 
 
 def _is_empty(line: bytes) -> bool:
-    text = line.strip()
-    return not text or text.startswith(b"#")
+    return not line.strip() or csv_dialect.is_comment(line)

@@ -1,5 +1,6 @@
 """How a file's columns are found: by its mapping, a preset or their own names; and what to give where they are not."""
 
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -10,12 +11,12 @@ from tauscope.recording.csv_dialect import is_number
 from tauscope.recording.layout.families import BY_NAME, role_of, words_of
 from tauscope.recording.layout.guess import guess_layout, guess_parts, is_numbered, layout_text
 from tauscope.recording.layout.presets import PRESET_OF
-from tauscope.recording.layout.rename import rename_columns
+from tauscope.recording.layout.rename import mismatch, rename_columns, require_as_many, say_layout
 from tauscope.recording.unit_text import collect_units, root_of, stated_unit
 from tauscope.recording.units import Reading
 from tauscope.result_warning import ResultWarning
-from tauscope.robot.messages import listed, printable
-from tauscope.robot.recording_layout import UNITS, RecordingLayout
+from tauscope.robot.messages import printable
+from tauscope.robot.recording_layout import UNITS, RecordingLayout, Source
 
 
 def find_layout(header: Sequence[str], reading: Reading, file: str) -> tuple[Reading, ColumnLayout]:
@@ -35,10 +36,8 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
     Raises RecordingError, which holds the mapping that the header suggests; RecordingMismatchError for other joints.
     """
     renamed = rename_columns(header, reading, file)
-    counts_rows = reading.units.get("t") == "index" and "t" not in renamed
     try:
-        layout = find_columns(["t", *renamed] if counts_rows else renamed, file, counts_rows=counts_rows)
-        return replace(layout, notes=_note_command(header, renamed))
+        return replace(_find_columns(renamed, reading, file), notes=_note_command(header, renamed))
     except RecordingError as error:
         if reading.columns is not None or isinstance(error, RecordingMismatchError):
             raise
@@ -46,9 +45,18 @@ def map_columns(header: Sequence[str], reading: Reading, file: str) -> ColumnLay
         if guess is None:
             if _is_ours(header):
                 raise
-            _require_known_names(header, reading, file)
+            if not is_numbered(header):
+                require_as_many(header, None, None, reading, file)
             raise RecordingError(f"{error}; {_say_parts(header, reading)}") from error
-        raise RecordingError(f"{_say_what_fails(error, header, file)}; {_say_guess(guess, header, reading)}") from error
+        what = f"{file}: the first row holds numbers where the column names are expected"
+        raise RecordingError(
+            f"{what if is_numbered(header) else error}; {_say_guess(guess, header, reading)}"
+        ) from error
+
+
+def _find_columns(renamed: Sequence[str], reading: Reading, file: str) -> ColumnLayout:
+    counts_rows = reading.units.get("t") == "index" and "t" not in renamed
+    return find_columns(["t", *renamed] if counts_rows else renamed, file, counts_rows=counts_rows)
 
 
 def _note_command(header: Sequence[str], renamed: Sequence[str]) -> tuple[ResultWarning, ...]:
@@ -90,55 +98,57 @@ def order_by_cells(
     is_by_place = reading.columns is not None and BY_NAME not in str(reading.columns)
     if len(robot) < 2 or not is_by_place:
         return layout
-    named = [cell for name, cell in zip(header, cells, strict=False) if "name" in words_of(name)]
+    named = {
+        cell: name
+        for name, cell in zip(header, cells, strict=False)
+        if "name" in words_of(name) and _LAST_NUMBER.search(name)
+    }
     if is_numbered(header):  # the texts before the numbers, of which a frame may be the first
-        named = [cell for cell in cells if not is_number(cell.encode()) and cell][-len(robot) :]
-    if len(named) != len(robot):
+        texts = [cell for cell in cells if cell and not is_number(cell.encode())][-len(robot) :]
+        named = {cell: str(place) for place, cell in enumerate(texts)}
+    if len(named) < len(robot):
         return layout
-    if set(named) != set(robot):
-        raise RecordingMismatchError(
-            f"{file}: the rows name the joints {listed(named)}, the robot's are {listed(robot)}; name the robot's "
-            "joints as the recording does"
-        )
+    if not set(robot) <= named.keys():
+        raise mismatch(f"{file}: the rows name", [*named], robot)
+
+    def move(column: str, index: int) -> int:
+        """Place of the column of the joint that the robot has in the place of this one."""
+        group = column.rstrip("0123456789")
+        joint = robot[int(column[len(group) :] or 1) - 1]
+        if is_numbered(header):
+            columns = sorted(each for name, each in where.items() if name.rstrip("0123456789") == group)
+            return columns[int(named[joint])] if len(columns) == len(robot) else index
+        wanted = _LAST_NUMBER.sub(_LAST_NUMBER.findall(named[joint])[0], header[index])
+        return header.index(wanted) if wanted in header else index
+
     where = dict(zip(layout.names, layout.source, strict=True))
-    moved = {}
-    for group in {name.rstrip("0123456789") for name in layout.names}:
-        columns = sorted(index for name, index in where.items() if name.rstrip("0123456789") == group)
-        if len(columns) == len(robot):
-            moved |= {f"{group}{joint}": columns[named.index(name)] for joint, name in enumerate(robot, 1)}
-    return replace(layout, source=tuple((where | moved)[name] for name in layout.names))
+    return replace(layout, source=tuple(move(column, index) for column, index in where.items()))
+
+
+_LAST_NUMBER = re.compile(r"[0-9]+(?=[^0-9]*$)")
 
 
 def suggest_layout(header: Sequence[str], reading: Reading, file: str) -> RecordingLayout | None:
     """The mapping that the header suggests, None where a file with it would be refused again."""
-    guess = guess_layout(header, reading.joint_names, prefers_torque=reading.prefers_torque)
+    guess = guess_layout(header, reading)
     if guess is None:
         return None
-    units = _units_of_tool(header, reading, guess)
+    units = _units_of_tool(header)
     try:
-        layout = find_columns(rename_columns(header, replace(reading, columns=guess.columns), file), file)
+        layout = _find_columns(rename_columns(header, replace(reading, columns=guess), file), reading, file)
     except RecordingError:
         return None
     with suppress(RecordingError):  # who reads the file so is told of units that are not known
         units = {**units, **units_of_names(header, layout, replace(reading, units=units), file)}
-    return replace(guess, units=units)
+    return RecordingLayout(columns=guess, units=units)
 
 
-def _units_of_tool(header: Sequence[str], reading: Reading, guess: RecordingLayout) -> Mapping[str, str]:
-    """Units of the preset that reads the same columns, such as LeRobot's degrees."""
-    for name, preset in PRESET_OF.items():
-        if preset.units:
-            layout = guess_layout(header, reading.joint_names, preset=name, prefers_torque=reading.prefers_torque)
-            if layout is not None and layout.columns == guess.columns:
-                return preset.units
-    return {}
-
-
-def _require_known_names(header: Sequence[str], reading: Reading, file: str) -> None:
-    """Refuse columns that name other joints than the robot's: the message lists both."""
-    named = guess_layout(header) if reading.joint_names is not None else None
-    if named is not None and isinstance(named.columns, Mapping) and BY_NAME in str(named.columns["q"]):
-        rename_columns(header, replace(reading, columns=named.columns), file)
+def _units_of_tool(header: Sequence[str]) -> Mapping[str, str]:
+    """Units of the preset whose mark a column has, such as LeRobot's degrees."""
+    marked = (preset for preset in PRESET_OF.values() if preset.mark)
+    return next(
+        (preset.units for preset in marked if any(re.search(f"{preset.mark}(?![A-Za-z])", name) for name in header)), {}
+    )
 
 
 def _is_ours(header: Sequence[str]) -> bool:
@@ -146,26 +156,21 @@ def _is_ours(header: Sequence[str]) -> bool:
     return "t" in header and "q1" in header
 
 
-def _say_what_fails(error: RecordingError, header: Sequence[str], file: str) -> str:
-    if is_numbered(header):
-        return f"{file}: the first row holds numbers where the column names are expected"
-    return str(error)
-
-
 def _say_guess(guess: RecordingLayout, header: Sequence[str], reading: Reading) -> str:
     """What to give where a header suggests all columns, and what it takes for granted."""
-    layout = layout_text(replace(guess, decimal=reading.decimal, delimiter=reading.delimiter))
     condition = "this maps them"
     if not is_numbered(header) and isinstance(guess.columns, Mapping) and isinstance(guess.columns["q"], list):
         condition = f"the first {len(guess.columns['q'])} joints are the robot's"
-    return f"if {condition}, give it as --columns FILE.yaml: {layout}"
+    return say_layout(replace(guess, decimal=reading.decimal, delimiter=reading.delimiter), condition)
 
 
 def _say_parts(header: Sequence[str], reading: Reading) -> str:
     """What to give where it suggests some: a mapping with ``?`` for the others."""
-    found = guess_parts(header, reading.joint_names).columns
-    parts = dict(found) if isinstance(found, Mapping) else {}
-    lacks = {"t": "?", "q": "?{1}"} | ({} if {"i", "qref"} & set(parts) else {"tau": "?{1}"})
+    parts = guess_parts(header, reading)
+    each: Source = ["?"] * len(reading.joint_names or "?") if is_numbered(header) else "?{1}"
+    lacks: dict[str, Source] = {"t": "?", "q": each, "tau": each}
+    if {"i", "qref"} & parts.keys():
+        del lacks["tau"]
     layout = layout_text(RecordingLayout(columns=lacks | parts))
     timeless = " (without t, and with --units t=index --rate HZ, where no column is the time)"
     return f"give --columns FILE.yaml with a name for each ?{'' if 't' in parts else timeless}: {layout}"

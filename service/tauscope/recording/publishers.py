@@ -7,8 +7,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from tauscope.errors import RecordingError, RecordingMismatchError
+from tauscope.errors import RecordingError
 from tauscope.recording.joint_state import JointStates
+from tauscope.recording.layout.rename import mismatch
 from tauscope.result_warning import ResultWarning
 from tauscope.robot.messages import listed
 
@@ -65,13 +66,7 @@ class OtherPublishers:
         known = wanted or ()
         partial = dict.fromkeys(name for _, names in self._counts if set(names) & set(known) for name in names)
         found = tuple(partial) or max(self._counts, key=lambda entry: self._counts[entry], default=("", ()))[1]
-        missed = [name for name in known if name not in found]
-        verb = "is" if len(missed) == 1 else "are"
-        lacks = f": {listed(missed)} {verb} missing; record them too, or" if partial else ";"
-        return RecordingMismatchError(
-            f"{place} carries {len(found)} joints ({listed(found)}), the robot has {len(known)} ({listed(known)})"
-            f"{lacks} name the joints in the robot file as the recording does"
-        )
+        return mismatch(f"{place} carries", found, known)
 
 
 def _messages(count: int) -> str:

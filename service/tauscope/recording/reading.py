@@ -2,7 +2,7 @@
 
 import errno
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -25,7 +25,7 @@ from tauscope.recording.ros_bags import ROS1_MAGIC, SQLITE_MAGIC, add_database, 
 from tauscope.recording.units import SI, Reading
 from tauscope.remote_files import copy_locally, find_path, is_folder, knows_ranges, name_failures, open_ranges
 from tauscope.robot.messages import printable
-from tauscope.robot.recording_layout import UNITS
+from tauscope.robot.recording_layout import UNITS, RecordingLayout
 from tauscope.robot.robot import Robot
 from tauscope.strict_model import entry
 
@@ -46,8 +46,7 @@ _FORMATS = (
     _Format(MCAP_MAGIC, add_log=add_mcap, reads_ranges=True),
     _Format(SQLITE_MAGIC, add_log=add_database),
     _Format(ROS1_MAGIC, add_log=add_ros1_bag),
-    _Format(array_files.ZIP_MAGIC, array_files.read_arrays, array_files.read_arrays_header),
-    _Format(array_files.MATLAB_MAGIC, array_files.read_arrays, array_files.read_arrays_header),
+    *(_Format(magic, array_files.read_arrays, array_files.read_arrays_header) for magic in array_files.MAGICS),
 )
 _JSON = _Format(b"", array_files.read_arrays, array_files.read_arrays_header)
 _CSV = _Format(b"", read_csv, read_csv_header)
@@ -58,7 +57,7 @@ _MAGIC_BYTES = 16
 _FOREIGN = (
     (b"\x89HDF", "is an HDF5 file; export it as CSV or Parquet"),
     (b"MATLAB 7.3", "is a MATLAB file of version 7.3; save it by save(..., '-v7')"),
-    (b"\x93NUMPY", "is one NumPy array; save time, positions and torques by np.savez"),
+    (b"header:\n", "is text of `ros2 topic echo`; record a bag, or echo with --csv"),
     (b"#ROSBAG V1", "is a bag of ROS 0.x; run `rosbag fix` on it first"),
     (b"\xff\xfe", "is UTF-16 text; save it as UTF-8"),
     (b"\xfe\xff", "is UTF-16 text; save it as UTF-8"),
@@ -189,12 +188,11 @@ def find_mapping(path: Path, robot: Robot | None = None, reading: Reading = SI) 
 
 def _suggest(header: Sequence[str], reading: Reading) -> ColumnMapping:
     if reading.columns is None:
-        guess = suggest_layout(header, reading, "") or guess_parts(header, reading.joint_names)
+        guess = suggest_layout(header, reading, "") or RecordingLayout(columns=guess_parts(header, reading))
         reading = replace(reading, columns=guess.columns, units={**guess.units, **reading.units})
-    try:
+    renamed: Sequence[str] = ()
+    with suppress(RecordingError):
         renamed = rename_columns(header, reading, "")
-    except RecordingError:
-        renamed = ()
     columns = {target: name for target, name in zip(renamed, header, strict=False) if is_column(target)}
     return ColumnMapping(tuple(header), columns, _complete_units(reading.units, columns), is_guessed=True)
 

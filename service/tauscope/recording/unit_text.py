@@ -5,38 +5,21 @@ from collections.abc import Mapping
 
 from tauscope.robot.recording_layout import UNITS
 
-_SPELLINGS: Mapping[str, Mapping[str, str]] = {
-    "t": {
-        "s": "s sec secs second seconds",
-        "ms": "ms msec millisecond milliseconds",
-        "us": "us µs μs usec microsecond microseconds",
-        "ns": "ns nsec nanosecond nanoseconds",
-        "min": "min minute minutes",
-    },
-    "q": {
-        "rad": "rad radian radians",
-        "mrad": "mrad",
-        "deg": "deg degs degree degrees ° º",
-        "rev": "rev revs revolution revolutions turn turns",
-        "m": "m",
-        "mm": "mm",
-        "cm": "cm",
-    },
-    "tau": {
-        "Nm": "nm",
-        "N": "n",
-        "mNm": "mnm",
-        "Ncm": "ncm",
-        "Nmm": "nmm",
-        "kNm": "knm",
-        "kN": "kn",
-        "lbft": "lbft lbfft ftlb ftlbf",
-        "lbin": "lbin lbfin inlb inlbf",
-        "ozin": "ozin ozfin inoz",
-        "A": "a amp amps ampere",
-        "mA": "ma",
-        "drive": "% percent pct ‰ permille promille 01%",
-    },
+# Other spellings than the unit's own, without blanks and signs.
+_SPELLINGS: Mapping[str, str] = {
+    "s": "sec secs second seconds",
+    "ms": "msec millisecond milliseconds",
+    "us": "µs μs usec microsecond microseconds",
+    "ns": "nsec nanosecond nanoseconds",
+    "min": "minute minutes",
+    "rad": "radian radians",
+    "deg": "degs degree degrees ° º",
+    "rev": "revs revolution revolutions turn turns",
+    "lbft": "lbfft ftlb ftlbf",
+    "lbin": "lbfin inlb inlbf",
+    "ozin": "ozfin inoz",
+    "A": "amp amps ampere",
+    "drive": "% percent pct ‰ permille promille 01%",
 }
 _PER_MINUTE = ("rpm", "1/min", "min1", "u/min")
 _LIKE: Mapping[str, str] = {"i": "tau", "qref": "q", "qlink": "q", "taucmd": "tau"}
@@ -63,7 +46,8 @@ def find_unit(column: str, text: str) -> str | None:
         if plain in _PER_MINUTE:
             return "rpm"
         plain, root = "deg" if plain == "dps" else _PER_SECOND.sub("", plain), "q"
-    return next((unit for unit, spelled in _SPELLINGS.get(root, {}).items() if plain in spelled.split()), None)
+    known = [unit for unit in UNITS.get(root, ()) if unit not in ("index", "rpm")]
+    return next((unit for unit in known if plain in (unit.lower(), *_SPELLINGS.get(unit, "").split())), None)
 
 
 def stated_unit(column: str, name: str) -> str | None:
@@ -76,21 +60,16 @@ def stated_unit(column: str, name: str) -> str | None:
     return next(filter(None, (find_unit(column, text) for text in texts)), texts[-1] if texts else None)
 
 
-_QUANTITIES = {
-    **{"rad": "q", "deg": "q", "mrad": "q", "rev": "q"},
-    **dict.fromkeys(("Nm", "mNm", "Ncm", "Nmm", "kNm", "lbft", "lbin", "ozin"), "tau"),
-    **{"A": "i", "mA": "i"},
-}  # lengths and forces are the tool's, mostly
+_OF_TOOLS = ("m", "cm", "mm", "N", "kN", "drive")  # units of the tool's positions and forces, mostly
 
 
 def find_quantity(name: str) -> str | None:
     """The group whose unit stands in brackets in a name that says nothing else: ``M1 [Nm]``."""
     for text in _BRACKETED.findall(name):
-        for group in ("q", "tau"):
-            if quantity := _QUANTITIES.get(find_unit(group, text) or ""):
-                return quantity
-        if find_unit("qd", text):
-            return "qd"
+        for group in ("q", "tau", "qd"):
+            unit = find_unit(group, text)
+            if unit is not None and (unit not in _OF_TOOLS or group == "qd"):
+                return "i" if unit in ("A", "mA") else group
     return None
 
 

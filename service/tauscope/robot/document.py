@@ -10,6 +10,7 @@ from pydantic_core import ErrorDetails
 from tauscope.errors import RobotFileError
 from tauscope.robot.actuator import SERVOS, ActuatorKind, GainUnit
 from tauscope.robot.document_fields import (
+    Angle,
     Document,
     Motion,
     Name,
@@ -114,10 +115,10 @@ Columns = Annotated[Source, BeforeValidator(check_source)]
 class DenavitHartenbergRowDocument(Document):
     """One row of ``dh`` or ``mdh``."""
 
-    theta: Number  # θ [rad]
+    theta: Angle  # θ [rad]
     d: Number  # along z [m]
     a: Number  # along x [m]
-    alpha: Number  # α [rad]
+    alpha: Angle  # α [rad]
     type: Motion = JointType.REVOLUTE
 
 

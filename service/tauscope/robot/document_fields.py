@@ -171,6 +171,7 @@ NotNegative = Annotated[
 Share = Annotated[
     Number, _require(lambda value: 0.0 < value <= 1.0, "must be a share above 0 and up to 1, but is {0:g}")
 ]
+Angle = Annotated[Number, _require(lambda value: abs(value) < 6.3, "is {0:g} rad, beyond a turn; 90° are 1.5708")]
 Nonzero = Annotated[Number, _require(bool, f"must not be zero; {_UNKNOWN}")]
 Name = Annotated[str, BeforeValidator(_name)]
 Text = Annotated[str, BeforeValidator(_text)]

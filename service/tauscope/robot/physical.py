@@ -8,8 +8,9 @@ Its limit, inertia without mass, counts as a body: some robot files state motors
 
 import numpy as np
 
+from tauscope.result_warning import ResultWarning
 from tauscope.robot.document_fields import LARGEST_NUMBER
-from tauscope.robot.robot import Array, LinkInertia
+from tauscope.robot.robot import Array, JointType, LinkInertia, Robot
 
 # Violation, relative to the moments of inertia, that rounding to four digits can cause: repaired without a word.
 ROUNDING = 1e-3
@@ -128,3 +129,29 @@ def _principal_moments(inertia: Array) -> Array:
 
 def _list(vector: Array) -> str:
     return "[" + ", ".join(f"{value:g}" for value in vector) + "]"
+
+
+MOST_TURNS, LONGEST_CHAIN = 4.0, 20.0  # of a limited revolute joint, either way, and of an arm [m]
+DENSEST, SHORTEST = 5000.0, 0.3  # mass by the cube of the reach [kg/m³], of an arm of this length at least [m]
+
+
+def doubt_units(robot: Robot, label: str) -> tuple[ResultWarning, ...]:
+    """Limits in degrees, lengths in mm and masses in g, as drawing programs write them."""
+    parts = [part.translation for each in robot.segments for part in (each.before, each.after)]
+    reach = float(np.linalg.norm(parts, axis=1).sum())
+    size = max(reach, SHORTEST)
+    limits = [joint.limits.position or (0.0, 0.0) for joint in robot.joints if joint.type is JointType.REVOLUTE]
+    turns = max((max(map(abs, limit)) / (2.0 * np.pi) for limit in limits), default=0.0)
+    mass = sum(link.mass for link in robot.model.links or ())
+    doubts = (
+        (turns > MOST_TURNS, f"a revolute joint is limited to {turns:.4g} turns", "limits in rad"),
+        (reach > LONGEST_CHAIN, f"the chain is {reach:.4g} m long", "lengths in m"),
+        (mass > DENSEST * size**3, f"an arm of {reach:.3g} m weighs {mass:.4g} kg", "masses in kg"),
+    )
+    return tuple(
+        ResultWarning(
+            code="doubtful-units", text=f"{label}: {text}", remedy=f"state {remedy} in the robot's description"
+        )
+        for is_doubtful, text, remedy in doubts
+        if is_doubtful
+    )

@@ -12,7 +12,8 @@ UNITS: Mapping[str, tuple[str, ...]] = {
     "tau": ("Nm", "N", "mNm", "Ncm", "Nmm", "kNm", "kN", "lbft", "lbin", "ozin", "A", "mA", "drive"),
 }
 
-PRESETS = ("rtde", "libfranka", "plotjuggler", "lerobot", "mujoco", "isaac")  # names of the layouts that are known
+# Names of the layouts that are known.
+PRESETS = ("rtde", "libfranka", "plotjuggler", "lerobot", "mujoco", "isaac", "odrive", "moteus")
 DECIMALS = (".", ",")
 # Delimiters, as signs and by name; a blank stands for any number of blanks and tabs.
 DELIMITERS: Mapping[str, str] = {

@@ -26,7 +26,7 @@ from tauscope.robot.document import (
 )
 from tauscope.robot.kinematics import DenavitHartenbergRow, modified_segments, standard_segments
 from tauscope.robot.messages import Finding, Severity, shown
-from tauscope.robot.physical import nearest_body, repair_text
+from tauscope.robot.physical import doubt_units, nearest_body, repair_text
 from tauscope.robot.recording_layout import RecordingLayout
 from tauscope.robot.robot import (
     Coupling,
@@ -115,7 +115,7 @@ def build_robot(document: RobotDocument, origin: DocumentOrigin, file_source: Fi
     layout, gravity = document.recording, EARTH if chain is None or chain.gravity is None else chain.gravity
     if document.gravity is not None:
         gravity = np.array(document.gravity)
-    return Robot(
+    robot = Robot(
         name=document.name,
         joints=joints,
         segments=kinematics.segments,
@@ -131,6 +131,7 @@ def build_robot(document: RobotDocument, origin: DocumentOrigin, file_source: Fi
         repairs=repairs,
         recording=RecordingLayout() if layout is None else layout.layout,
     )
+    return replace(robot, notes=(*robot.notes, *doubt_units(robot, origin.label)))
 
 
 def _kinematics(document: RobotDocument, origin: DocumentOrigin, file_source: FileSource) -> _Kinematics:

@@ -323,10 +323,10 @@ def _largest(tree: UrdfTree, element: Element, key: str) -> float | None:
 
 def _limit(tree: UrdfTree, element: Element, key: str) -> float:
     """A limit; endless where the file says so, zero where it says nothing."""
-    text = (element.get(key) or "").strip().lower().lstrip("+-")
-    if text in ("inf", "infinity", ".inf"):
-        return math.copysign(math.inf, -1.0 if (element.get(key) or "").strip().startswith("-") else 1.0)
-    return 0.0 if text == "nan" else number(tree.label, element, key, 0.0)
+    text = (element.get(key) or "").strip().lower()
+    if text.lstrip("+-") in ("inf", "infinity", ".inf"):
+        return -math.inf if text.startswith("-") else math.inf
+    return 0.0 if text.lstrip("+-") == "nan" else number(tree.label, element, key, 0.0)
 
 
 def _friction(

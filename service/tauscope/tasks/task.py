@@ -17,7 +17,7 @@ from tauscope.recording import EffortKind, Reading, Recording, flow_text, open_r
 from tauscope.remote_files import find_path
 from tauscope.report.provenance import InputFile, Provenance, input_files, versions
 from tauscope.robot import RecordingLayout, Robot, find_column_fault, find_fault, find_separator_fault
-from tauscope.robot.recording_layout import UNITS
+from tauscope.robot.recording_layout import PRESETS, UNITS
 from tauscope.strict_model import StrictModel
 
 # Name of each input of a request in a report.
@@ -71,9 +71,9 @@ class ReadingOptions(StrictModel):
     )
     columns: str | dict[str, str | int | list[str | int]] | None = Field(
         default=None,
-        description="where the columns are found, where they have other names: a preset (rtde, libfranka, plotjuggler,"
-        " lerobot, mujoco, isaac), or for t, q, tau, i, qd, … or one joint's, as q3, the file's column, its number from"
-        " 1, one of them a joint, or a name with {0}, {1} or {name} for the joint; null: as the robot file says",
+        description=f"where the columns are found, where they have other names: a preset ({', '.join(PRESETS)}), or "
+        "for t, q, tau, i, qd, … or one joint's, as q3, the file's column, its number from 1, one of them a joint, or "
+        "a name with {0}, {1} or {name} for the joint; null: as the robot file says",
         examples=[{"t": "timestamp", "q": "actual_q_{0}", "tau": "target_moment_{0}"}],
     )
     decimal: str | None = Field(default=None, description="decimal sign of a CSV; null: detected")

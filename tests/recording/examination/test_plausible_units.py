@@ -97,6 +97,17 @@ def test_velocities_that_differ_by_joint_or_from_row_to_row_are_no_unit() -> Non
         assert find_implausible(change(samples, velocity=samples.velocity * factor)) is None
 
 
+def test_velocities_in_the_place_of_torque_are_refused() -> None:
+    samples = swing()
+    assert samples.velocity is not None
+    message = message_of(lambda: examine_recording(change(samples, velocity=samples.effort, effort=samples.velocity)))
+    assert (
+        "column tau1: tau1 to tau3 are the velocities of q1 to q3; name the columns of torque by --columns" in message
+    )
+    viscous = samples.velocity * [1.0, 1.0, 3.0]
+    assert find_implausible(change(samples, effort=viscous)) is None
+
+
 def test_degrees_of_a_single_pendulum_show_in_its_torque() -> None:
     samples = swing(joints=1)
     turned = change(samples, position=100 * samples.position, velocity=None, effort=20 * np.sin(100 * samples.position))

@@ -120,6 +120,19 @@ def test_joints_of_another_robot_are_listed(tmp_path: Path) -> None:
     assert "names 3 joints (shoulder_pan, elbow, wrist_1), the robot has 3 (a, b, c)" in message
 
 
+def test_joints_that_a_recording_lacks_are_to_be_locked(tmp_path: Path) -> None:
+    path = write(tmp_path / "file.csv", columns_of(STYLES["plotjuggler"]), np.column_stack([TIME, Q, QD, TAU]))
+    message = message_of(lambda: read(path, read_layout("plotjuggler"), (*JOINTS, "finger")))
+    assert "finger is missing; record them too, or state in a robot file locked: {finger: 0}" in message
+
+
+def test_a_preset_of_another_tool_shows_the_mapping_that_would_do(tmp_path: Path) -> None:
+    path = write(tmp_path / "file.csv", columns_of(STYLES["franka"]), np.column_stack([TIME, Q, QD, TAU]))
+    message = message_of(lambda: read(path, read_layout("mujoco"), JOINTS))
+    assert "no column holds the position, which mujoco calls qpos" in message
+    assert np.array_equal(rows_of(read(path, guess_of(message), JOINTS)), np.column_stack([TIME, Q, TAU, QD]))
+
+
 def test_measured_torque_goes_before_current_and_current_before_a_command(tmp_path: Path) -> None:
     header = ["timestamp", "actual_q_0", "target_moment_0", "actual_current_0"]
     path = write(tmp_path / "file.csv", header, np.column_stack([TIME, Q]))
@@ -147,6 +160,19 @@ def test_rows_are_counted_where_a_rate_is_stated(tmp_path: Path) -> None:
     recording = read_recording(path, reading=Reading({"t": "index"}, 50.0))
     assert np.allclose(recording.samples().time, np.arange(40) / 50.0)
     assert np.array_equal(recording.samples().position, Q)
+
+
+def test_without_a_time_the_rate_makes_the_mapping_whole(tmp_path: Path) -> None:
+    header = [f"{name}[{k}]" for name in ("qpos", "effort", "action") for k in range(3)]
+    path = write(tmp_path / "file.csv", header, np.column_stack([Q, TAU, Q]))
+    message = message_of(lambda: read_recording(path, joint_names=JOINTS))
+    assert "without t, and with --units t=index --rate HZ" in message
+    reading = Reading({"t": "index"}, 50.0, joint_names=JOINTS)
+    layout = guess_of(message_of(lambda: read_recording(path, joint_names=JOINTS, reading=reading)))
+    samples = read_recording(path, joint_names=JOINTS, reading=replace(reading, columns=layout.columns)).samples()
+    assert np.allclose(samples.time, np.arange(40) / 50.0)
+    assert np.array_equal(samples.position, Q)
+    assert np.array_equal(samples.effort, TAU)
 
 
 def test_a_preset_of_another_arm_is_refused(tmp_path: Path) -> None:
@@ -331,9 +357,9 @@ def test_words_go_before_units() -> None:
         *(f"X{k} [Nm]" for k in (1, 2)),
         *(f"predicted torque {k}" for k in (1, 2)),
     ]
-    layout = guess_layout(header, ("a", "b"))
+    layout = guess_layout(header, Reading(joint_names=("a", "b")))
     assert layout is not None
-    assert layout.columns == {"t": "t", "q": "q{1}", "tau": "predicted torque {1}"}
+    assert layout == {"t": "t", "q": "q{1}", "tau": "predicted torque {1}"}
 
 
 @pytest.mark.parametrize("has_joints", [True, False])
@@ -452,7 +478,29 @@ def test_joints_that_rows_name_are_matched_by_name(tmp_path: Path, has_names: bo
     found = rows_of(read(path, layout, JOINTS))
     np.testing.assert_allclose(found[:, 1:10], np.column_stack([Q, TAU, QD]))
     message = message_of(lambda: read(path, layout, ("a", "b", "c")))
-    assert "the rows name the joints elbow, shoulder_pan, wrist_1, the robot's are a, b, c" in message
+    assert "the rows name 3 joints (elbow, shoulder_pan, wrist_1), the robot has 3 (a, b, c)" in message
+
+
+@given(order=st.permutations([*JOINTS, "finger", "thumb"]))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=20)
+def test_rows_that_name_more_joints_than_the_robot_has(tmp_path: Path, order: list[str]) -> None:
+    places = [JOINTS.index(name) if name in JOINTS else -1 for name in order]
+    groups = [np.column_stack([each, np.zeros(len(TIME))])[:, places].tolist() for each in (Q, TAU)]
+    fields = [f"field.{name}{k}" for name in ("name", "position", "effort") for k in range(len(order))]
+    rows = [[float(time), *order, *q, *tau] for time, q, tau in zip(TIME, *groups, strict=True)]
+    path = tmp_path / "echo.csv"
+    path.write_text("\n".join([",".join(["time", *fields]), *(",".join(map(str, row)) for row in rows)]) + "\n")
+    layout = guess_of(message_of(lambda: read(path, RecordingLayout(), JOINTS)))
+    assert np.array_equal(rows_of(read(path, layout, JOINTS)), np.column_stack([TIME, Q, TAU]))
+
+
+def test_a_file_without_names_asks_for_the_numbers_of_its_columns(tmp_path: Path) -> None:
+    path = write(tmp_path / "file.csv", None, np.column_stack([TIME, Q, TAU, TAU[:, :1]]))
+    message = message_of(lambda: read_recording(path, joint_names=JOINTS))
+    assert '{t: "?", q: ["?", "?", "?"], tau: ["?", "?", "?"]}' in message
+    filled = message.replace('t: "?"', "t: 1").replace('q: ["?", "?", "?"]', "q: [2, 3, 4]")
+    layout = guess_of(filled.replace('["?", "?", "?"]', "[5, 6, 7]"))
+    assert np.array_equal(rows_of(read(path, layout, JOINTS)), np.column_stack([TIME, Q, TAU]))
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,8 @@ def find_implausible(recording: Recording, robot: Robot | None = None) -> str | 
     """A column that can hardly be in the stated unit: its name, the evidence, and the option that mends it."""
     sketch, types = Sketch.of(recording), joint_types(recording, robot)
     return (
-        _doubt_velocity(sketch, types)
+        _doubt_effort(sketch)
+        or _doubt_velocity(sketch, types)
         or _doubt_time(sketch)
         or _doubt_angle(sketch, types, robot)
         or find_implausible_torque(recording, sketch, robot)
@@ -54,9 +55,18 @@ def _doubt(column: str, evidence: str, units: str = "") -> str:
     return f"column {column}: {evidence}; {f'read it with --units {units}' if units else 'write it in SI units'}"
 
 
+def _doubt_effort(sketch: Sketch) -> str | None:
+    """Efforts that are the velocities, at every joint: columns of a file without names, say, in another order."""
+    ratios = _slope_ratios(sketch, sketch.effort_at_slope, SAME_RATIO)
+    n = len(ratios)
+    if n < 2 or not (np.abs(ratios - 1.0) < SAME_RATIO).all():
+        return None
+    return f"column tau1: tau1 to tau{n} are the velocities of q1 to q{n}; name the columns of torque by --columns"
+
+
 def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> str | None:
     """Recorded velocity against the positions' own: their ratio is a ratio of units."""
-    ratios = _velocity_ratios(sketch)
+    ratios = _slope_ratios(sketch, sketch.velocity)
     known = np.isfinite(ratios)
     if not known.any():
         return None
@@ -80,47 +90,43 @@ def _doubt_velocity(sketch: Sketch, types: list[JointType]) -> str | None:
     if deviation <= SAME_RATIO:
         column = "t" if time != "s" else f"q{joint + 1}" if position not in SI_LENGTHS else f"qd{joint + 1}"
         named = {"t": time, "q": position, "qd": speed}
-        units = [f"{key}={unit}" for key, unit in named.items() if unit not in ("s", "rad", "m")]
+        units = [f"{key}={unit}" for key, unit in named.items() if unit not in ("s", *SI_LENGTHS)]
         if position in ("deg", "mm") and speed in SI_LENGTHS:
             units.append(f"qd={speed}")
-        ratio = " and ".join(_name_foreign_units(time, position, speed))
-        return _doubt(column, f"{evidence}, the ratio of {ratio}", ",".join(units))
+        words = {
+            "t": "s",
+            "q": "m" if position == "mm" else "rad",
+            "qd": "m/s in qd" if speed == "mm" else "rad/s in qd",
+        }
+        ratio = [f"{unit} to {words[key]}" for key, unit in named.items() if unit not in ("s", *SI_LENGTHS)]
+        return _doubt(column, f"{evidence}, the ratio of {' and '.join(ratio)}", ",".join(units))
     if abs(sketch.interval - 1.0) < 1e-9:
         text = f"rises by 1 from row to row, and {evidence}: it counts samples of about {1.0 / typical:.4g} Hz"
         return _doubt("t", text, "t=index --rate HZ")
     return None
 
 
-def _velocity_ratios(sketch: Sketch) -> np.ndarray:
-    """Δq/Δt over recorded velocity, (n,); NaN where it is no steady ratio."""
+def _slope_ratios(sketch: Sketch, others: np.ndarray | None, steady: float = STEADY_RATIO) -> np.ndarray:
+    """Δq/Δt over other columns, (n,); NaN where it is no steady ratio. `others`: (N, n), of the rows of the slope."""
     ratios = np.full(sketch.position.shape[1], np.nan)
-    if sketch.velocity is None:
+    if others is None:
         return ratios
-    for joint, (slope, velocity) in enumerate(zip(sketch.slope.T, sketch.velocity.T, strict=True)):
-        known = np.isfinite(slope) & np.isfinite(velocity)
+    for joint, (slope, other) in enumerate(zip(sketch.slope.T, others.T, strict=True)):
+        known = np.isfinite(slope) & np.isfinite(other)
         if not known.any():
             continue
-        fast = known & (np.abs(velocity) > FAST_PART * np.percentile(np.abs(velocity[known]), 99.0))
+        fast = known & (np.abs(other) > FAST_PART * np.percentile(np.abs(other[known]), 99.0))
         if fast.sum() < FEWEST_ROWS:
             continue
-        low, middle, high = np.percentile(slope[fast] / velocity[fast], [25, 50, 75])
-        if middle > 0.0 and high - low < STEADY_RATIO * middle:
+        low, middle, high = np.percentile(slope[fast] / other[fast], [25, 50, 75])
+        if middle > 0.0 and high - low < steady * middle:
             ratios[joint] = middle
     return ratios
 
 
-def _name_foreign_units(time: str, position: str, speed: str) -> list[str]:
-    words = (
-        "" if time == "s" else f"{time} to s",
-        "" if position in SI_LENGTHS else f"{position} to {'m' if position == 'mm' else 'rad'}",
-        "" if speed in SI_LENGTHS else f"{speed} to {'m/s' if speed == 'mm' else 'rad/s'} in qd",
-    )
-    return [*filter(None, words)]
-
-
 def _doubt_time(sketch: Sketch) -> str | None:
     """Rates, and lengths of motions, that no arm's recording has."""
-    ratios = _velocity_ratios(sketch)
+    ratios = _slope_ratios(sketch, sketch.velocity)
     if (np.abs(ratios - 1.0) < AGREEMENT).any():
         return None  # the recorded velocity vouches for the clock
     interval, moving = sketch.interval, (sketch.span > LEAST_SWEEP) & (sketch.top_speed > 0.0)

@@ -10,33 +10,36 @@ def _split(words: str) -> tuple[str, ...]:
 
 
 _WORDS_OF = {
-    "q": "q qpos position positions pos angle angles theta state axis winkel istposition istwinkel",
+    "q": "q qpos position positions pos angle angles theta state winkel istposition istwinkel mp",
     "qd": "qd dq qdot qvel velocity velocities vel speed speeds omega",
     "qdd": "qdd ddq qacc acceleration accelerations acc",
-    "tau": "tau torque torques effort efforts eff trq moment moments force drehmoment istmoment",
-    "i": "i current currents cur curr strom iststrom load",
-    "qref": "qref action sollposition sollwinkel",
+    "tau": "tau torque torques effort efforts eff trq moment moments force drehmoment istmoment mt",
+    "i": "i iq current currents cur curr strom iststrom load",
+    "qref": "qref action sollposition sollwinkel ip",
     "taucmd": "taucmd ctrl",
     "temp": "temp temperature temperatures",
     "volt": "volt volts voltage voltages",
     "qlink": "qlink",
 }
 _CORES: Mapping[str, str] = {word: group for group, words in _WORDS_OF.items() for word in _split(words)}
-_COMMANDED = _split("target desired des d cmd command commanded ref reference goal setpoint setpt sp soll consigne ipo")
+_COMMANDED = _split(
+    "target desired des d cmd command commanded ref reference goal setpoint setpt sp soll consigne ipo action"
+)
 # Words of quantities that belong to no joint, or are not its measurement.
 _FOREIGN = {
     *_split("tcp ee eef cartesian base tool ext external wrench object pose contact"),
     *_split("qfrc gravity error err bias limit limits max min std stddev var variance accelerometer imu"),
 }
 _QUALIFIERS = _split("present actual measured meas act raw filtered msr computed applied")
+_JOINTS = {*_split("axis joint j a")}  # what is said of it is its position: `J1`, `AXIS_ACT_A1`
 _NO_NAMES = {*_CORES, *_COMMANDED, *_QUALIFIERS}  # they name a quantity or how it came about, and no joint
 # Words that make a family second choice.
 _LEVELS: Mapping[str, int] = {
-    **{"computed": 1, "motor": 1, "force": 2, "theta": 2, "load": 2, "state": 3, "axis": 4},
+    **{"computed": 1, "motor": 1, "force": 2, "theta": 2, "load": 2, "state": 3},
     **dict.fromkeys(_split("ff feedforward est estimated estimate model modelled predicted nominal friction"), 5),
 }
 _TIMES = _split(
-    "t time zeit timestamp zeitstempel stamp sim_time time_s seconds secs sec clock elapsed duration"
+    "t time zeit timestamp zeitstempel stamp sim_time time_s tout x_value seconds secs sec clock elapsed duration"
 )  # the likeliest first
 
 
@@ -46,17 +49,23 @@ def role_of(words: Sequence[str]) -> tuple[str, int] | None:
         return "tau", 0
     if _FOREIGN.intersection(words):
         return None
-    cores = sorted((word for word in words if word in _CORES), key=lambda word: word != "axis")  # a joint, mostly
-    if not cores:
+    cores = [word for word in words if word in _CORES]
+    is_joint = not cores and bool(words) and _JOINTS.union(_COMMANDED, _QUALIFIERS).issuperset(words)
+    if not cores and not is_joint:
         return None
-    role = _CORES[cores[-1]]
+    role = "q" if is_joint else _CORES[cores[-1]]
     if "dot" in words:
         role = {"q": "qd", "qd": "qdd"}.get(role, role)
     if "link" in words and role == "q":
         role = "qlink"
     if set(_COMMANDED).intersection(words):
         role = {"q": "qref", "tau": "taucmd", "qref": "qref", "taucmd": "taucmd"}.get(role, "")
-    return (role, sum(_LEVELS.get(word, 0) for word in words)) if role else None
+    return (role, sum(_LEVELS.get(word, 0) for word in words) + 4 * is_joint) if role else None
+
+
+def source_of(words: Sequence[str]) -> frozenset[str]:
+    """The words that say whose quantity a column holds: `leader`, `sim`."""
+    return frozenset(words) - _NO_NAMES - _LEVELS.keys() - {"joint"}
 
 
 def is_silent(words: Sequence[str]) -> bool:
@@ -70,6 +79,11 @@ def time_rank(words: Sequence[str]) -> int | None:
     if name in _TIMES:
         return _TIMES.index(name)
     return next((len(_TIMES) + rank for rank, time in enumerate(_TIMES) if name.endswith(f"_{time}")), None)
+
+
+def is_name_list(column: str) -> bool:
+    """Whether a column, or an array, is the list of joints or columns that other lists follow: ``msg.name``."""
+    return re.split(r"[./]", column)[-1].lower() in ("name", "names", "joint_names", "joints", "columns", "header")
 
 
 # Placeholders of a template: the joint's number from 0, its number from 1, its name.
@@ -155,6 +169,8 @@ def _find_numbered(header: Sequence[str]) -> list[Family]:
             names = tuple(columns[number] for number in sorted(columns))
             is_regular = all(fill_template(template, k, None) == name for k, name in enumerate(names))
             found.append(Family(template, names, is_regular))
+            if first == 1 and (stem := before.rstrip("._ ") + after) in header:  # pandas: `pos`, `pos.1`, `pos.2`
+                found.append(Family(template, (stem, *names), is_regular=False))
     return found
 
 

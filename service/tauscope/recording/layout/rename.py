@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from tauscope.errors import RecordingError, RecordingMismatchError
-from tauscope.recording.layout.families import BY_NAME, PLACEHOLDERS, fill_template, names_in
+from tauscope.recording.layout.families import BY_NAME, FROM_ZERO, PLACEHOLDERS, fill_template, names_in
 from tauscope.recording.layout.guess import guess_layout, guess_parts, layout_text
 from tauscope.recording.layout.presets import PRESET_OF
 from tauscope.recording.units import Reading
@@ -38,40 +38,60 @@ def rename_columns(header: Sequence[str], reading: Reading, file: str) -> list[s
 
 
 def _preset_columns(header: Sequence[str], preset: str, reading: Reading, file: str) -> Mapping[str, Source]:
-    layout = guess_layout(header, reading.joint_names, preset=preset, prefers_torque=reading.prefers_torque)
-    _require_as_many(header, preset, layout, reading, file)
-    if layout is None:
-        parts = guess_parts(header, reading.joint_names, preset=preset).columns or {}
-        known = PRESET_OF[preset].columns
-        lacks, names = ("time", known["t"]) if "t" not in parts else ("position", known["q"])
-        if "t" in parts and "q" in parts:
-            lacks, names = "effort", [name for group in ("tau", "i", "taucmd") for name in known.get(group, ())]
-        raise RecordingError(
-            f"{file}: no column holds the {lacks}, which {preset} calls {' or '.join(names)}; the columns are "
-            f"{listed(header)}; record it, or name the columns by --columns FILE.yaml"
-        )
-    assert isinstance(layout.columns, Mapping)  # noqa: S101 - a guess always is one
-    return layout.columns
+    columns = guess_layout(header, reading, preset)
+    require_as_many(header, preset, columns, reading, file)
+    if columns is not None:
+        return columns
+    parts, known = guess_parts(header, reading, preset), PRESET_OF[preset].columns
+    lacks, groups = next(
+        (words, groups)
+        for words, *groups in (("time", "t"), ("position", "q"), ("effort", "tau", "i", "taucmd"))
+        if not parts.keys() & {*groups}
+    )
+    names = [name for group in groups for name in known.get(group, ())]
+    other = guess_layout(header, reading)
+    way_out = "record it, or name the columns by --columns FILE.yaml"
+    way_out = way_out if other is None else say_layout(RecordingLayout(columns=other), "this maps")
+    raise RecordingError(
+        f"{file}: no column holds the {lacks}, which {preset} calls {' or '.join(names)}; the columns are "
+        f"{listed(header)}; {way_out}"
+    )
 
 
-def _require_as_many(
-    header: Sequence[str], preset: str, layout: RecordingLayout | None, reading: Reading, file: str
+def require_as_many(
+    header: Sequence[str], preset: str | None, columns: Mapping[str, Source] | None, reading: Reading, file: str
 ) -> None:
-    """Refuse a preset's columns of other joints, or of more or fewer, than the robot has."""
-    found = None if reading.joint_names is None else guess_layout(header, None, preset=preset)
-    if found is None or reading.joint_names is None or not isinstance(found.columns, Mapping):
-        return
-    if layout is None:
-        _Mapping(header, reading, file).expand(found.columns)  # names the joints that differ
+    """Refuse columns of other joints, or of more or fewer, than the robot has. `columns`: those that fit it, if any."""
     unnamed = replace(reading, joint_names=None)
-    targets = _Mapping(header, unnamed, file).expand(found.columns).values()
+    found = None if reading.joint_names is None else guess_layout(header, unnamed, preset)
+    if found is None or reading.joint_names is None:
+        return
+    if columns is None:
+        _Mapping(header, reading, file).expand(found)  # names the joints that differ
+    targets = _Mapping(header, unnamed, file).expand(found).values()
     count, wanted = sum(_group(target) == "q" for target in targets), len(reading.joint_names)
-    is_by_name = layout is not None and isinstance(layout.columns, Mapping) and BY_NAME in str(layout.columns["q"])
-    if count != wanted and not is_by_name:
+    if count != wanted and (columns is None or BY_NAME not in str(columns["q"])):
         hint = "give the robot file and the recording of the same arm"
-        if layout is not None:
-            hint = f"if the first {wanted} are the robot's, give --columns FILE.yaml: {layout_text(layout)}"
+        if columns is not None:
+            hint = say_layout(RecordingLayout(columns=columns), f"the first {wanted} are the robot's")
         raise RecordingMismatchError(f"{file}: the columns are of {count} joints, the robot has {wanted}; {hint}")
+
+
+def say_layout(layout: RecordingLayout, condition: str) -> str:
+    """The mapping to give, and what it takes for granted."""
+    return f"if {condition}, give it as --columns FILE.yaml: {layout_text(layout)}"
+
+
+def mismatch(place: str, found: Sequence[str], robot: Sequence[str], way_out: str = "") -> RecordingMismatchError:
+    """Joints that are not the robot's. `place`: file, columns or topic, and the verb; `way_out`: beside new names."""
+    remedy = f"; name the robot's joints as the recording does{way_out}"
+    missed = [name for name in robot if name not in found]
+    if len(missed) < len(robot):
+        verb, still = "is" if len(missed) == 1 else "are", ", ".join(f"{name}: 0" for name in missed)
+        remedy = f": {listed(missed)} {verb} missing; record them too, or state in a robot file locked: {{{still}}}"
+    return RecordingMismatchError(
+        f"{place} {len(found)} joints ({listed(found)}), the robot has {len(robot)} ({listed(robot)}){remedy}"
+    )
 
 
 class _Mapping:
@@ -128,15 +148,8 @@ class _Mapping:
         if not any(placeholder in template for placeholder in PLACEHOLDERS):
             if template in self._places:
                 return [template]
-            element = next(
-                (
-                    f"{template}[{joint}]"
-                    for joint in ("{0}", BY_NAME)
-                    if names_in(self._header, f"{template}[{BY_NAME}]")
-                ),
-                "",
-            )
-            template = element or template
+            if elements := names_in(self._header, f"{template}[{BY_NAME}]"):
+                template += f"[{FROM_ZERO if elements[0].isdecimal() else BY_NAME}]"
         if BY_NAME in template:
             return self._match_by_name(template)
         if not any(placeholder in template for placeholder in PLACEHOLDERS):
@@ -158,11 +171,8 @@ class _Mapping:
             self._names = found
         missing = [name for name in self._names if name not in found]
         if not found or missing:
-            raise RecordingMismatchError(
-                f"{self._file}: {printable(template)} names {len(found)} joints ({listed(found)}), the robot has "
-                f"{len(self._names)} ({listed(self._names)}); name the robot's joints as the recording does, or list "
-                "the columns in the order of the robot's joints"
-            )
+            way_out = ", or list the columns in the order of the robot's joints"
+            raise mismatch(f"{self._file}: {printable(template)} names", found, self._names, way_out)
         return [fill_template(template, 0, name) for name in self._names]
 
 
