@@ -132,8 +132,7 @@ def _measure_limited_share(loop: Actuator, made: Recording, commands: Recording,
         return 0.0
     voltage = commands.samples().voltage
     supply = loop.supply_voltage if voltage is None else voltage[:, joint]
-    limit = loop.conversion.max_duty if loop.max_duty is None else loop.max_duty
-    top = 0.999 * limit * (loop.volt_torque or 0.0) * np.asarray(supply)
+    top = 0.999 * loop.duty_limit * (loop.volt_torque or 0.0) * np.asarray(supply)
     return float(np.mean(np.abs(made.samples().effort[:, joint]) >= top))
 
 

@@ -18,6 +18,13 @@ LEAST_HARMONIC = 0.3  # smallest amplitude of a random start, as part of what th
 BISECTIONS = 12  # halvings between a feasible and an infeasible motion
 SETTLED = 0.999  # usage that is aimed at where torque or workspace bind: what lies between samples has the rest
 
+# what each bound on torque is called, and what to do where it leaves no posture
+_BOUNDS = {
+    "torque": ("torque limit", "check the limit, the model and the margin"),
+    "voltage": ("supply voltage", "check actuator.supply_voltage and torque_per_volt, the model and the margin"),
+    "following error": ("following error", "raise the servo's P gain and actuator.kp, or allow a larger error"),
+}
+
 
 @dataclass(frozen=True, eq=False)
 class Feasibility:
@@ -97,12 +104,12 @@ class Feasibility:
         if torque is not None:
             least = parts[0].min(axis=0)
             if least.max() > SETTLED:
-                j = int(np.argmax(least))
-                joint, needed = self.robot.joints[j], least[j] * torque.available[j]
-                unit = joint.type.torque_unit
+                row, j = divmod(int(np.argmax(least)), self.robot.joint_count)
+                joint, available = self.robot.joints[j], torque.bounds.available[row, j]
+                unit, (what, remedy) = joint.type.torque_unit, _BOUNDS[torque.bounds.names[row]]
                 raise ExcitationError(
-                    f"{joint.name}: torque limit: at rest the prior model needs {needed:.4g} {unit} or more in every "
-                    f"posture, {torque.available[j]:.4g} {unit} may be used; check the limit, the model and the margin"
+                    f"{joint.name}: {what}: at rest the prior model needs {least.max() * available:.4g} {unit} or more "
+                    f"in every posture, {available:.4g} {unit} may be used; {remedy}"
                 )
         if workspace is not None:
             worst = workspace.clearance(postures).max(axis=0)

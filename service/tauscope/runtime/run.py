@@ -64,7 +64,8 @@ def prepare(task: RunTask, backend: Backend, state: ArmState) -> Plan:
         raise AcquisitionError(
             f"a watchdog of {options.watchdog_s:g} s: this arm's drives take {shortest:g} to {longest:g} s"
         )
-    plan = make_plan(task.robot, task.trajectory, _sound(backend, state, options).position, options, capabilities)
+    state = _sound(backend, state, options)
+    plan = make_plan(task.robot, task.trajectory, state.position, options, capabilities, state.voltage)
     least = LEAST_CYCLES_A_WATCHDOG * plan.period_ns * 1e-9
     if options.watchdog_s < least:
         raise AcquisitionError(
