@@ -54,6 +54,7 @@ def _parameters(robot: Robot) -> Array | None:
 
 MOST_CYCLES = 4_000_000  # A longer run must be a mistake: it is more than two hours at 500 cycles a second
 _ROUNDING = 1e-9
+_LEAST_PACE = 0.1  # part of the speed limits below which no ramp is slowed down for weak servos: they are refused
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +117,8 @@ def make_plan(
     _require_within(limits, robot, start, low, high, speed)
     begin = np.clip(start, limits.position_low, limits.position_high)
     bounds, usual = servo_bounds(robot, limits.following, rate_hz, voltage), motion_limits(robot)
-    way = ramp(begin, trajectory.start, replace(usual, velocity=np.minimum(usual.velocity, bounds.speed)))
+    gentle = np.clip(bounds.speed, _LEAST_PACE * usual.velocity, usual.velocity)
+    way = ramp(begin, trajectory.start, replace(usual, velocity=gentle))
     way = MoveSegment(way.start, way.end, float(np.ceil(way.duration_s * rate_hz)) / rate_hz)
     ramp_cycles = round(way.duration_s * rate_hz)
     moved = way.evaluate(np.arange(ramp_cycles) / rate_hz)
