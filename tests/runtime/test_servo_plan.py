@@ -76,5 +76,5 @@ def test_torque_that_is_no_number_is_refused() -> None:
     bounds = servo_bounds(replace(robot, joints=tuple(replace(joint, actuator=STRONG) for joint in robot.joints)))
     torque = np.zeros((5, 2))
     torque[3, 1] = np.nan
-    with pytest.raises(AcquisitionError, match="joint2: 0.3 s after the start the motion needs nan Nm"):
+    with pytest.raises(AcquisitionError, match=r"joint2: .* needs nan Nm"):
         _require_followed(robot, bounds, torque, np.zeros((5, 2)), 10.0, droops=True)
