@@ -60,7 +60,7 @@ def desk_arm(kp: float, velocity: float = 2.0) -> dict[str, Any]:
         {
             "mass": mass,
             "first_moment": [-mass * reach, 0.0, 0.002],
-            "inertia": {"xx": 3e-4, "yy": about, "zz": about, "xy": 0.0, "xz": 0.0, "yz": 0.0},
+            "inertia": {"xx": 6e-4, "yy": about, "zz": about, "xy": 0.0, "xz": 0.0, "yz": 0.0},
         }
         for mass, reach in ((0.15, 0.02), (0.2, 0.06), (0.22, 0.08))
         for about in [1.3 * mass * reach**2 + 1e-4]
