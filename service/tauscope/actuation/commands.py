@@ -48,11 +48,8 @@ def make_efforts(
                 f" torque per volt, and stated masses do not tell it; state joints[{place}].actuator.torque_per_volt"
             )
         robot = with_torque_per_volt(robot, scales, STATED_MASS_STD)
-    joints = tuple(
-        joint if joint.actuator is None else replace(joint, actuator=replace(joint.actuator, delay=delay.value))
-        for joint, delay in zip(robot.joints, delays, strict=True)
-    )
-    driven = replace(robot, joints=joints)
+    pairs = zip(robot.actuators, delays, strict=True)
+    driven = robot.with_actuators(loop and replace(loop, delay=delay.value) for loop, delay in pairs)
     made = {id(each): _make_effort(driven, each, delays) for each in (*commands, *unseen)}
     told = _describe(driven, delays, [made[id(each)] for each in given], given, open_)
     train, judge = (tuple(made.get(id(each), each) for each in some) for some in (recordings, held_out))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tauscope.excitation.information import Criterion, reported_value
+from tauscope.excitation.information import Criterion
 from tauscope.excitation.margins import Margins, trajectory_margins
 from tauscope.excitation.optimiser import OptimiserProgress, optimise
 from tauscope.excitation.setting import ExcitationOptions, Setting
@@ -71,11 +71,7 @@ def design_excitation(
         value=value,
         condition_number=condition_number,
         random_value=result.random_value,
-        history=tuple(
-            HistoryPart(start=each.start, iteration=each.iteration, value=value, violation=each.violation)
-            for each in result.history
-            if np.isfinite(value := reported_value(options.criterion, each.own))
-        ),
+        history=tuple(result.history),
         margins=margins,
         active=_active(robot, margins, options),
         notes=_notes(robot, setting, slow),
@@ -103,8 +99,8 @@ def _notes(robot: Robot, setting: Setting, slow: SlowPart) -> tuple[str, ...]:
         missing = [joint.name for joint in robot.joints if joint.limits.torque is None]
         if missing:
             notes.append(f"torque is not constrained on {', '.join(missing)}: no limit is stated")
-    loops = [(joint.name, joint.actuator) for joint in robot.joints]
-    unknown = [name for name, loop in loops if loop is not None and loop.unit == "register" and not loop.stall_torque]
+    pairs = zip(robot.joints, robot.actuators, strict=True)
+    unknown = [joint.name for joint, loop in pairs if loop and loop.unit == "register" and not loop.stall_torque]
     if unknown:
         keys = "actuator.supply_voltage and torque_per_volt"
         notes.append(f"what the servo follows is not constrained on {', '.join(unknown)}: state {keys}")

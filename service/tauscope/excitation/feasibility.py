@@ -11,19 +11,13 @@ from tauscope.robot import Robot
 from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
 from tauscope.trajectory.limits import MotionLimits
+from tauscope.trajectory.servo_bounds import BOUNDS
 
 POSTURES = 2048  # random postures at which is asked whether the arm can stand there at all
 LEAST_HALF_RANGE = 1e-3  # half range below which a joint has no room to move [rad or m]
 LEAST_HARMONIC = 0.3  # smallest amplitude of a random start, as part of what the joints' own limits allow
 BISECTIONS = 12  # halvings between a feasible and an infeasible motion
 SETTLED = 0.999  # usage that is aimed at where torque or workspace bind: what lies between samples has the rest
-
-# what each bound on torque is called, and what to do where it leaves no posture
-_BOUNDS = {
-    "torque": ("torque limit", "check the limit, the model and the margin"),
-    "voltage": ("supply voltage", "check actuator.supply_voltage and torque_per_volt, the model and the margin"),
-    "following error": ("following error", "raise the servo's P gain and actuator.kp, or allow a larger error"),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +100,11 @@ class Feasibility:
             if least.max() > SETTLED:
                 row, j = divmod(int(np.argmax(least)), self.robot.joint_count)
                 joint, available = self.robot.joints[j], torque.bounds.available[row, j]
-                unit, (what, remedy) = joint.type.torque_unit, _BOUNDS[torque.bounds.names[row]]
+                unit, name = joint.type.torque_unit, torque.bounds.names[row]
+                remedy = BOUNDS.get(name, "check the limit, the model and the margin")
                 raise ExcitationError(
-                    f"{joint.name}: {what}: at rest the prior model needs {least.max() * available:.4g} {unit} or more "
-                    f"in every posture, {available:.4g} {unit} may be used; {remedy}"
+                    f"{joint.name}: {name} limit: at rest the prior model needs {least.max() * available:.4g} {unit} "
+                    f"or more in every posture, {available:.4g} {unit} may be used; {remedy}"
                 )
         if workspace is not None:
             worst = workspace.clearance(postures).max(axis=0)

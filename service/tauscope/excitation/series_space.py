@@ -52,13 +52,6 @@ class SeriesSpace:
             speed * (x[:, 1 + free :] @ self._sine.T),
         )
 
-    def vector(self, series: FourierSeries) -> Array:
-        """The vector of a series that rests at its ends, (n, columns)."""
-        limits = self._limits
-        speed = limits.velocity[:, None]
-        centre = (series.centre - limits.middle) / limits.half_range
-        return np.column_stack([centre, series.cosine / speed @ self._cosine, series.sine / speed @ self._sine])
-
     def grid(self, samples: int) -> "SeriesGrid":
         """Equispaced instants of one period."""
         omega = 2.0 * np.pi / self.period_s * self._order

@@ -14,7 +14,7 @@ from tauscope.runtime.guard import GuardLimits, guard_limits
 from tauscope.runtime.options import RunOptions, choose_rate_hz
 from tauscope.trajectory.limits import motion_limits
 from tauscope.trajectory.segments import MoveSegment
-from tauscope.trajectory.servo_bounds import TorqueBounds, servo_bounds
+from tauscope.trajectory.servo_bounds import BOUNDS, TorqueBounds, servo_bounds
 from tauscope.trajectory.trajectory import Trajectory, ramp
 from tauscope_drivers import Capabilities, ControlMode
 
@@ -129,8 +129,8 @@ def make_plan(
     acceleration = np.concatenate([moved.acceleration, rest, motion.acceleration])
     before = ramp_cycles + pause
     gives_torque = options.mode is ControlMode.TORQUE or (options.feed_forward and capabilities.takes_feed_forward)
-    torque = predict_torque(robot, position, velocity, acceleration)
-    torque = np.zeros_like(position) if torque is None else torque
+    known = predict_torque(robot, position, velocity, acceleration) if gives_torque or bounds.names else None
+    torque = np.zeros_like(position) if known is None else known
     _require_followed(robot, bounds, torque, velocity, rate_hz, droops=not gives_torque)
     # A model may be wrong, the arm must not pay for it.
     given = np.clip(torque, -limits.torque, limits.torque) if gives_torque else np.zeros_like(torque)
@@ -149,10 +149,8 @@ def make_plan(
 def _require_fitting(robot: Robot, trajectory: Trajectory, start: Array, capabilities: Capabilities) -> None:
     """Refuse a motion or an arm of another number of joints, and an arm that does not say where it stands."""
     n = robot.joint_count
-    for count, what in (
-        (trajectory.joint_count, "the trajectory moves"),
-        (capabilities.joint_count, "the backend has"),
-    ):
+    counts = {"the trajectory moves": trajectory.joint_count, "the backend has": capabilities.joint_count}
+    for what, count in counts.items():
         if count != n:
             raise AcquisitionError(f"{robot.name} has {n} joints, {what} {count}; give what belongs to this arm")
     silent = [joint.name for joint, position in zip(robot.joints, start, strict=True) if not np.isfinite(position)]
@@ -178,12 +176,6 @@ def _require_within(limits: GuardLimits, robot: Robot, start: Array, low: Array,
             )
 
 
-_REMEDIES = {
-    "voltage": "design it anew, lower limits.velocity, or raise the supply",
-    "following error": "design it anew, raise the servo's P gain and actuator.kp, or allow a larger following_error",
-}
-
-
 def _require_followed(
     robot: Robot, bounds: TorqueBounds, torque: Array, velocity: Array, rate_hz: float, *, droops: bool
 ) -> None:
@@ -202,5 +194,5 @@ def _require_followed(
         raise AcquisitionError(
             f"{joint.name}: {cycle / rate_hz:.3g} s after the start the motion needs {abs(torque[cycle, j]):.3g} "
             f"{joint.type.torque_unit} at {speed[cycle, j]:.3g} {joint.type.unit}/s; its {name} leaves "
-            f"{max(available[cycle, j], 0.0):.3g} {joint.type.torque_unit} there; {_REMEDIES[name]}"
+            f"{max(available[cycle, j], 0.0):.3g} {joint.type.torque_unit} there; design it anew; {BOUNDS[name]}"
         )

@@ -8,14 +8,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tauscope.robot import Actuator, JointType, Robot
+from tauscope.robot import JointType, Robot
 from tauscope.robot.robot import Array
 
 # Following error that is allowed where nothing is stated [rad or m].
 DEFAULT_FOLLOWING = {JointType.REVOLUTE: 0.2, JointType.PRISMATIC: 0.05}
 USUAL_RATE_HZ = 100.0  # cycles a second that a bus of servos allows
 PACE_CYCLES = 2.0  # delay of a goal that a driver paces, where none is stated
-BOUNDS = ("voltage", "following error")
+BOUNDS = {  # and what to do where one leaves too little
+    "voltage": "lower limits.velocity, or raise the supply and actuator.supply_voltage",
+    "following error": "raise the servo's P gain and actuator.kp, or allow a larger following_error",
+}
 READ_CYCLES = 1.0  # age of the position that the guard compares with a goal
 
 
@@ -36,14 +39,10 @@ class TorqueBounds:
         """Used part of each bound, (N, B, n); `torque`, |τ|, and `speed`, |q̇|: (N, n)."""
         return (torque[:, None] + self.damping * speed[:, None]) / self.available
 
-    def scaled(self, factor: float) -> "TorqueBounds":
-        """A part of every available torque."""
-        return replace(self, available=factor * self.available)
-
-    def with_limit(self, torque: Array) -> "TorqueBounds":
-        """Joint torque limits, (n,), before the other bounds."""
+    def with_limit(self, torque: Array, part: float = 1.0) -> "TorqueBounds":
+        """A part of these and, before them, of joint torque limits, (n,)."""
         damping = np.vstack([np.zeros_like(torque), self.damping])
-        return TorqueBounds(("torque", *self.names), np.vstack([torque, self.available]), damping)
+        return TorqueBounds(("torque", *self.names), part * np.vstack([torque, self.available]), damping)
 
 
 def servo_bounds(
@@ -70,12 +69,7 @@ def servo_bounds(
         if (stall := loop.stall_torque) is not None:
             available[0, j], damping[0, j] = stall, loop.damping
         if loop.kind == "position" and (stiffness := loop.stiffness) is not None:
-            available[1, j], damping[1, j] = stiffness * allowed[j], loop.damping + stiffness * _lag_s(loop, rate_hz)
+            lag_s = (PACE_CYCLES / rate_hz if loop.delay is None else loop.delay) + READ_CYCLES / rate_hz
+            available[1, j], damping[1, j] = stiffness * allowed[j], loop.damping + stiffness * lag_s
     rows = np.flatnonzero(np.isfinite(available).any(axis=1))
-    return TorqueBounds(tuple(BOUNDS[row] for row in rows), available[rows], damping[rows])
-
-
-def _lag_s(loop: Actuator, rate_hz: float) -> float:
-    """How late the guard sees the joint where its goal was [s]."""
-    delay = PACE_CYCLES / rate_hz if loop.delay is None else loop.delay
-    return delay + READ_CYCLES / rate_hz
+    return TorqueBounds(tuple(list(BOUNDS)[row] for row in rows), available[rows], damping[rows])

@@ -28,8 +28,7 @@ class PlantArm(ServoArm):
         self._plant.place(position)
         super().__init__(self._plant.motor_motion)
         self._inertia = InertiaSchedule(robot, scenario.effects)
-        loops = [joint.actuator for joint in robot.joints]
-        self._loops = {j: loop for j, loop in enumerate(loops) if loop is not None and loop.kind == "position"}
+        self._loops = {j: loop for j, loop in enumerate(robot.actuators) if loop and loop.kind == "position"}
         self._age = 0
 
     @override

@@ -129,6 +129,8 @@ class Side(StrEnum):
     FRICTION = "friction"  # on the motor's side, as friction that heats the joint
     MOTOR = "motor"  # on the motor's side
     LINK = "link"  # on the link's side: part of the load that the transmission carries
+    LOAD_GAIN = "load_gain"  # a unit of that load
+    LOAD_FRICTION = "load_friction"  # a unit of that load's magnitude, as friction
 
 
 class JointLaw(JointEffect):
@@ -152,18 +154,20 @@ class FrictionLaw(SmoothSignEffect, JointLaw):
 
 class _LawTerm(Term):
     def __init__(self, joint: int, place: int, side: Side, law: Law) -> None:
-        self._joint, self._place, self._side = joint, place, side.value
+        self._joint, self._place, self._side = joint, place, side
         self._torque, self._slopes = law
+        self.depends_on_load = side in (Side.LOAD_GAIN, Side.LOAD_FRICTION)
 
     def act(self, moment: Moment, forces: Forces) -> None:
         torque = self._torque(moment.position[self._place], moment.velocity[self._place])
-        getattr(forces, self._side)[self._joint] += torque
+        getattr(forces, self._side.value)[self._joint] += torque
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        place = self._place
+        place, load = self._place, moment.load[self._joint]
+        factor = {Side.LOAD_GAIN: load, Side.LOAD_FRICTION: abs(load)}.get(self._side, 1.0)
         by_position, by_velocity = self._slopes(moment.position[place], moment.velocity[place])
-        slopes.by_position[place, place] += by_position
-        slopes.by_velocity[place, place] += by_velocity
+        slopes.by_position[place, place] += factor * by_position
+        slopes.by_velocity[place, place] += factor * by_velocity
 
 
 class CoulombTerm(Term):

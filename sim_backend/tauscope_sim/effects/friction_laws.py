@@ -7,6 +7,7 @@ from tauscope.robot.document_fields import Number, Positive
 from tauscope.robot.robot import Robot
 from tauscope_sim.effects.effect import Exponent, FrictionLaw, JointLaw, Law, Side
 from tauscope_sim.friction import smooth_sign, smooth_sign_slope
+from tauscope_sim.plant.term import LARGEST_GAIN
 
 
 class CoulombFriction(FrictionLaw):
@@ -115,3 +116,20 @@ class PositionDependentFriction(FrictionLaw):
             return by_position, c * smooth_sign_slope(v, k_v) * math.sin(angle)
 
         return (lambda q, v: c * smooth_sign(v, k_v) * math.sin(self.order * q + self.phase)), slopes
+
+
+class LoadDependentFriction(FrictionLaw):
+    """τ = μ |L| A(v), L the torque that the transmission hands to the link; see `tauscope_sim.plant.term`."""
+
+    effect_id: ClassVar[str] = "load_dependent_friction"
+    side: ClassVar[Side] = Side.LOAD_FRICTION
+    mu: Positive  # μ [Nm/Nm]
+
+    def check(self, robot: Robot) -> None:
+        super().check(robot)
+        if self.mu > LARGEST_GAIN:
+            raise self.refused("mu", f"is {self.mu:g}: the transmission locks itself; make it at most {LARGEST_GAIN:g}")
+
+    def law(self, robot: Robot) -> Law:
+        mu, k_v = self.mu, self.steepness(robot)
+        return (lambda q, v: mu * smooth_sign(v, k_v)), (lambda q, v: (0.0, mu * smooth_sign_slope(v, k_v)))
