@@ -36,11 +36,6 @@ class SeriesSpace:
         self._cosine = null_space(np.ones((1, harmonics)))
         self._sine = null_space(self._order[None])
 
-    @property
-    def size(self) -> int:
-        """Number of free numbers."""
-        return self.joint_count * self.columns
-
     def series(self, x: Array) -> FourierSeries:
         """The series of a vector. `x`: (n, columns), centre and coefficients."""
         limits, free = self._limits, self.harmonics - 1

@@ -52,8 +52,7 @@ class GuardViolationError(AcquisitionError):
 
 DEFAULT_MARGIN = {JointType.REVOLUTE: 0.05, JointType.PRISMATIC: 0.01}
 """How far outside the position limits the arm itself, not a command, may be found [rad or m]."""
-SPEED_MARGIN = 1.5
-"""Measured speed may be this many times the limit: a drive's velocity is noisy where it comes from its encoder."""
+SPEED_MARGIN = 1.5  # measured speed may be this many times the limit: velocity is noisy where encoders give it
 _ROOM = 1.05
 
 

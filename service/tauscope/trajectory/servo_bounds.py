@@ -46,10 +46,7 @@ class TorqueBounds:
 
 
 def servo_bounds(
-    robot: Robot,
-    following: float | Array | None = None,
-    rate_hz: float = USUAL_RATE_HZ,
-    voltage: Array | None = None,
+    robot: Robot, following: float | Array | None = None, rate_hz: float = USUAL_RATE_HZ, voltage: Array | None = None
 ) -> TorqueBounds:
     """Those of `BOUNDS` that bind a joint.
 

@@ -59,16 +59,6 @@ def one_of(*words: str) -> Any:
     return BeforeValidator(_must_be(" or ".join(words), lambda value: isinstance(value, str) and value in words))
 
 
-def zero_vector() -> list[float]:
-    """Three zeros."""
-    return [0.0, 0.0, 0.0]
-
-
-def single_zero() -> list[float]:
-    """A zero for all."""
-    return [0.0]
-
-
 class ScenarioEntry(Document):
     """One entry of a scenario's list of effects: its fields are the entry's keys."""
 
@@ -147,9 +137,22 @@ class JointLaw(JointEffect):
 
 
 class FrictionLaw(SmoothSignEffect, JointLaw):
-    """A friction law τ(q, v) of one joint that uses A(v)."""
+    """A friction law τ = f(q, v) A(v) of one joint."""
 
     side: ClassVar[Side] = Side.FRICTION
+
+    def factor(self, q: float, v: float) -> tuple[float, float, float]:
+        """Factor f and its derivatives by q and v."""
+        raise NotImplementedError
+
+    def law(self, robot: Robot) -> Law:
+        k_v = self.steepness(robot)
+
+        def slopes(q: float, v: float) -> tuple[float, float]:
+            (f, by_position, by_velocity), sign = self.factor(q, v), smooth_sign(v, k_v)
+            return sign * by_position, f * smooth_sign_slope(v, k_v) + sign * by_velocity
+
+        return (lambda q, v: self.factor(q, v)[0] * smooth_sign(v, k_v)), slopes
 
 
 class _LawTerm(Term):

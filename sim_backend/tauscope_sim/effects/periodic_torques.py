@@ -7,7 +7,7 @@ from pydantic import Field
 
 from tauscope.robot.document_fields import Number, Positive
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import Exponent, JointLaw, Law, Numbers, Side, one_of, single_zero
+from tauscope_sim.effects.effect import Exponent, JointLaw, Law, Numbers, Side, one_of
 from tauscope_sim.plant.term import LARGEST_GAIN
 
 
@@ -17,7 +17,7 @@ class Cogging(JointLaw):
     effect_id: ClassVar[str] = "cogging"
     amplitude: Numbers  # a_i, a number or one an order [Nm or N]
     order: Numbers
-    phase: Numbers = Field(default_factory=single_zero)  # φ_i, a number or one an order [rad]
+    phase: Numbers = Field(default=[0.0])  # φ_i, a number or one an order [rad]
     angle: Annotated[str, one_of("joint", "motor")] = "joint"
 
     def check(self, robot: Robot) -> None:
