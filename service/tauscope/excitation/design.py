@@ -102,8 +102,7 @@ def _notes(robot: Robot, setting: Setting, slow: SlowPart) -> tuple[str, ...]:
     pairs = zip(robot.joints, robot.actuators, strict=True)
     unknown = [joint.name for joint, loop in pairs if loop and loop.unit == "register" and not loop.stall_torque]
     if unknown:
-        keys = "actuator.supply_voltage and torque_per_volt"
-        notes.append(f"what the servo follows is not constrained on {', '.join(unknown)}: state {keys}")
+        notes.append(f"{', '.join(unknown)}: servos limit nothing; state actuator.supply_voltage and torque_per_volt")
     wanted = setting.options.slow_postures
     if slow.postures < wanted:
         notes.append(f"slow reversals at {slow.postures} of {wanted} postures: no more have room within the limits")

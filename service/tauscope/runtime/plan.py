@@ -111,9 +111,8 @@ def make_plan(
     motion = trajectory.samples(rate_hz)
     speed = np.abs(np.diff(motion.position, axis=0)).max(axis=0, initial=0.0) * rate_hz
     low, high = motion.position.min(axis=0), motion.position.max(axis=0)
-    limits = guard_limits(
-        robot, low, high, speed, following=options.following_error, temperature_c=options.temperature_c
-    )
+    following, hottest = options.following_error, options.temperature_c
+    limits = guard_limits(robot, low, high, speed, following=following, temperature_c=hottest)
     _require_within(limits, robot, start, low, high, speed)
     begin = np.clip(start, limits.position_low, limits.position_high)
     bounds, usual = servo_bounds(robot, limits.following, rate_hz, voltage), motion_limits(robot)
