@@ -159,6 +159,6 @@ def _candidates(search: _Search, rng: np.random.Generator) -> list[Array]:
     if not found:
         raise ExcitationError(
             f"none of {CANDIDATES} random motions within the limits shows all parameters: the limits leave hardly any "
-            "motion; widen those of position, velocity, torque or workspace"
+            "motion; widen those of position, velocity, torque, workspace or following error"
         )
     return [x for _, _, x in sorted(found, key=lambda each: each[:2])]

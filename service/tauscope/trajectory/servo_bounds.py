@@ -14,10 +14,10 @@ from tauscope.robot.robot import Array
 # Following error that is allowed where nothing is stated [rad or m].
 DEFAULT_FOLLOWING = {JointType.REVOLUTE: 0.2, JointType.PRISMATIC: 0.05}
 USUAL_RATE_HZ = 100.0  # cycles a second that a bus of servos allows
-PACE_CYCLES = 2.0  # delay of a goal that a driver paces, where none is stated
+PACE_CYCLES = 2.0  # least delay of a goal that a driver paces
 BOUNDS = {  # and what to do where one leaves too little
     "voltage": "lower limits.velocity, or raise the supply and actuator.supply_voltage",
-    "following error": "raise the servo's P gain and actuator.kp, or allow a larger following_error",
+    "following error": "raise the servo's P gain and actuator.kp or the rate, or allow a larger following_error",
 }
 READ_CYCLES = 1.0  # age of the position that the guard compares with a goal
 
@@ -66,7 +66,7 @@ def servo_bounds(
         if (stall := loop.stall_torque) is not None:
             available[0, j], damping[0, j] = stall, loop.damping
         if loop.kind == "position" and (stiffness := loop.stiffness) is not None:
-            lag_s = (PACE_CYCLES / rate_hz if loop.delay is None else loop.delay) + READ_CYCLES / rate_hz
+            lag_s = max(PACE_CYCLES / rate_hz, loop.delay or 0.0) + READ_CYCLES / rate_hz
             available[1, j], damping[1, j] = stiffness * allowed[j], loop.damping + stiffness * lag_s
     rows = np.flatnonzero(np.isfinite(available).any(axis=1))
     return TorqueBounds(tuple(list(BOUNDS)[row] for row in rows), available[rows], damping[rows])
