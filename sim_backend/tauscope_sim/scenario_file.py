@@ -28,7 +28,7 @@ from tauscope.robot.messages import nearest, shown
 from tauscope.robot.robot import Array, Robot
 from tauscope.robot.yaml_text import Place, read_yaml
 from tauscope_sim.effects import EFFECTS, Effect, ScenarioEntry, SensorEffect
-from tauscope_sim.effects.effect import NotNegative, NotNegativeNumbers, Seed, single_zero
+from tauscope_sim.effects.effect import NotNegative, NotNegativeNumbers, Seed
 from tauscope_sim.scenario import Scenario
 
 LARGEST_SCENARIO_FILE = 256 * 1024
@@ -38,9 +38,9 @@ MOST_EFFECTS = 200
 class ScenarioDocument(Document):
     """The scenario file's keys."""
 
-    torque_noise_std: NotNegativeNumbers = Field(default_factory=single_zero)
-    position_noise_std: NotNegativeNumbers = Field(default_factory=single_zero)
-    encoder_step: NotNegativeNumbers = Field(default_factory=single_zero)
+    torque_noise_std: NotNegativeNumbers = Field(default=[0.0])
+    position_noise_std: NotNegativeNumbers = Field(default=[0.0])
+    encoder_step: NotNegativeNumbers = Field(default=[0.0])
     command_latency: NotNegative = 0.0  # [s]
     seed: Seed = 0
     effects: list[Any] = Field(default_factory=list, max_length=MOST_EFFECTS)

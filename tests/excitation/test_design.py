@@ -160,8 +160,7 @@ def test_a_tight_torque_limit_is_kept() -> None:
     robot = limited_paper_arm(torque=11.0)
     design = design_excitation(robot, QUICK)
     assert_within_limits(robot, design, QUICK)
-    assert design.margins.torque is not None
-    assert design.margins.torque.min() >= 0.0
+    assert design.margins.drive["torque"].min() >= 0.0
     free = design_excitation(limited_paper_arm(torque=None), QUICK)
     with pytest.raises(AssertionError):  # the limit binds: without it the motion asks for more
         assert_within_limits(robot, free, QUICK)
@@ -175,7 +174,7 @@ def test_a_robot_without_limits_or_model_says_what_was_assumed() -> None:
     assert "joint6: velocity assumed up to 1 rad/s" in notes
     assert "acceleration assumed up to 4 rad/s²" in notes
     assert "torque is not constrained: the robot file has no model" in notes
-    assert design.margins.torque is None
+    assert not design.margins.drive
     modelled = replace(robot, model=Model(tuple(random_link(np.random.default_rng(j)) for j in range(6))))
     design = design_excitation(modelled, replace(QUICK, periods=1, slow_postures=0, closing_period=False))
     assert "no limit is stated" in "\n".join(design.notes)

@@ -27,6 +27,7 @@ from tauscope.excitation.workspace import WorkspaceUsage
 from tauscope.robot import Robot
 from tauscope.robot.kinematics import link_placements
 from tauscope.trajectory import MotionSamples, motion_limits
+from tauscope.trajectory.servo_bounds import TorqueBounds, servo_bounds
 
 ARMS = gradient_arms()
 IDS = ["paper", "ur5", "panda", "random3", "random4"]
@@ -46,7 +47,9 @@ def problem(robot: Robot, criterion: Criterion, workspace: Workspace | None = No
     noise = np.random.default_rng(1).uniform(0.2, 1.0, robot.joint_count)
     regressor = ExcitationRegressor(robot, base, capacity=SAMPLES, noise_std=noise, steepest=np.full(len(noise), 12.0))
     scaling = np.random.default_rng(2).uniform(0.5, 2.0, regressor.column_count)
-    torque = TorquePrediction(robot, base, regressor, limits.velocity, 0.5 * limits.torque)
+    damping = np.outer([0.0, 3.0], np.ones_like(noise))  # the second bound is that of a servo with back-EMF
+    bounds = TorqueBounds(("torque", "voltage"), np.stack([0.5 * limits.torque, 0.6 * limits.torque]), damping)
+    torque = TorquePrediction(robot, base, regressor, limits.velocity, bounds)
     obstacles = None if workspace is None else WorkspaceUsage(robot, workspace)
     made = ExcitationProblem(
         space,
@@ -142,7 +145,8 @@ def test_predicted_torque_is_pinocchio_s_plus_friction(seed: int) -> None:
     robot = modelled_arm(rng, 2 + seed)
     limits, base = motion_limits(robot), base_parameters(robot)
     regressor = ExcitationRegressor(robot, base, capacity=50)
-    prediction = TorquePrediction(robot, base, regressor, limits.velocity, limits.torque)
+    bounds = servo_bounds(robot).with_limit(limits.torque)
+    prediction = TorquePrediction(robot, base, regressor, limits.velocity, bounds)
     motion = resting_series(rng, robot.joint_count).evaluate(np.linspace(0.0, 10.0, 50))
     assert robot.model.links is not None
     assert robot.model.friction is not None
@@ -190,7 +194,10 @@ def test_a_vector_and_its_series_are_the_same() -> None:
     robot = ARMS[1]
     space, x = coefficients(robot)
     series = space.series(x)
-    np.testing.assert_allclose(space.vector(series), x, atol=1e-12)
+    limits = motion_limits(robot)
+    speed = limits.velocity[:, None]
+    parts = (series.cosine / speed @ space._cosine, series.sine / speed @ space._sine)
+    np.testing.assert_allclose(np.column_stack([(series.centre - limits.middle) / limits.half_range, *parts]), x)
     assert max(rest_error(series)) < 1e-13
     on_grid = space.grid(50).motion(x)
     exact = series.evaluate(np.arange(50.0) * 0.2)

@@ -12,12 +12,14 @@ class ServoSpecification:
     """One servo.
 
     `torque_per_permille`: joint torque of 1 ‰ of duty [Nm].
+    `back_emf`: torque that back-EMF takes from it [Nm s/rad].
     `registers`: as they differ from a delivered servo's.
     """
 
     servo: int
     baud: int = 1_000_000
     torque_per_permille: float = 1.91e-3
+    back_emf: float = 0.0
     direction: int = 1
     reduction: float = 1.0
     zero_count: int = 2048

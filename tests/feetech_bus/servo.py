@@ -119,6 +119,7 @@ class FeetechServo:
         unit = 1 if memory.get("phase") & 4 else 50
         memory.put("position", (counts + self.encoder_offset_counts) % _TURN)
         memory.put("speed", round(velocity * specification.counts_per_radian / unit))
-        load = round(torque / specification.torque_per_permille) * specification.direction
+        driven = torque + specification.back_emf * velocity  # the duty of the bridge, not the torque, is reported
+        load = round(driven / specification.torque_per_permille) * specification.direction
         memory.put("load", max(-1000, min(1000, load)))
         memory.put("moving", int(abs(velocity) > 0.01))

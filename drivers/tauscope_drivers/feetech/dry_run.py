@@ -7,7 +7,7 @@ from tauscope_drivers.drive_block import DriveJoint
 from tauscope_drivers.errors import DriverError
 from tauscope_drivers.feetech import packets
 from tauscope_drivers.feetech.bus import encode_registers
-from tauscope_drivers.feetech.commissioning import Reading, ServoTask, plan_task
+from tauscope_drivers.feetech.commissioning import Reading, plan_task
 from tauscope_drivers.feetech.configuration import read_configuration
 from tauscope_drivers.feetech.enabling import goal_writes, taking_writes
 from tauscope_drivers.feetech.registers import COUNTS_PER_TURN, FEEDBACK, IDENTITY, PERMILLE, SETTINGS, TARGETS, Block
@@ -32,8 +32,15 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
     servos = [JointServo(number, servo) for number, servo in enumerate(read_configuration(joints).servos, 1)]
     require_sensible(request.limits, request.targets[0], [servo.label for servo in servos])
     tasks = [plan_task(servo, _DELIVERED, request.limits, joint) for joint, servo in enumerate(servos)]
-    yield from _connection(servos)
-    yield from _enabling(servos, tasks, request)
+    for servo in servos:
+        yield _frame("connect", f"{servo.label}: are you there?", packets.encode_ping(servo.servo))
+        yield _read(servo, "connect", IDENTITY, "model and firmware?")
+        yield _read(servo, "connect", SETTINGS, "settings in EEPROM?")
+    for servo, task, place in zip(servos, tasks, request.targets[0], strict=True):
+        for write in taking_writes(task, servo.counts(float(place)), None):
+            told = ", ".join(f"{name} := {value}" for name, value in write.items())
+            frame = packets.encode_write(servo.servo, *encode_registers(write))
+            yield _frame("enable", f"{servo.label}: {told}", frame)
     held = [servo.counts(float(place)) for servo, place in zip(servos, request.targets[0], strict=True)]
     pace, cycle_s = None, request.cycle_s
     if cycle_s is not None:
@@ -44,21 +51,6 @@ def plan_frames(joints: Sequence[DriveJoint], request: FrameRequest) -> Iterator
         yield from _cycle(servos, writes, servos[cycle % len(servos)])
     for servo in servos:
         yield _read(servo, "stop", TARGETS, f"holds its last goal ({StopPolicy.HOLD}): torque and limits?")
-
-
-def _connection(servos: Sequence[JointServo]) -> Iterator[PlannedFrame]:
-    for servo in servos:
-        yield _frame("connect", f"{servo.label}: are you there?", packets.encode_ping(servo.servo))
-        yield _read(servo, "connect", IDENTITY, "model and firmware?")
-        yield _read(servo, "connect", SETTINGS, "settings in EEPROM?")
-
-
-def _enabling(
-    servos: Sequence[JointServo], tasks: Sequence[ServoTask], request: FrameRequest
-) -> Iterator[PlannedFrame]:
-    for servo, task, place in zip(servos, tasks, request.targets[0], strict=True):
-        for write in taking_writes(task, servo.counts(float(place)), None):
-            yield _write(servo, write)
 
 
 def _cycle(
@@ -82,8 +74,3 @@ def _cycle(
 def _read(servo: JointServo, phase: str, block: Block, meaning: str) -> PlannedFrame:
     frame = packets.encode_read(servo.servo, block.address, block.length)
     return _frame(phase, f"{servo.label}: {meaning}", frame)
-
-
-def _write(servo: JointServo, values: Mapping[str, int]) -> PlannedFrame:
-    told = ", ".join(f"{name} := {value}" for name, value in values.items())
-    return _frame("enable", f"{servo.label}: {told}", packets.encode_write(servo.servo, *encode_registers(values)))

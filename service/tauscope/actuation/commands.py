@@ -48,11 +48,8 @@ def make_efforts(
                 f" torque per volt, and stated masses do not tell it; state joints[{place}].actuator.torque_per_volt"
             )
         robot = with_torque_per_volt(robot, scales, STATED_MASS_STD)
-    joints = tuple(
-        joint if joint.actuator is None else replace(joint, actuator=replace(joint.actuator, delay=delay.value))
-        for joint, delay in zip(robot.joints, delays, strict=True)
-    )
-    driven = replace(robot, joints=joints)
+    pairs = zip(robot.actuators, delays, strict=True)
+    driven = robot.with_actuators(loop and replace(loop, delay=delay.value) for loop, delay in pairs)
     made = {id(each): _make_effort(driven, each, delays) for each in (*commands, *unseen)}
     told = _describe(driven, delays, [made[id(each)] for each in given], given, open_)
     train, judge = (tuple(made.get(id(each), each) for each in some) for some in (recordings, held_out))
@@ -132,8 +129,7 @@ def _measure_limited_share(loop: Actuator, made: Recording, commands: Recording,
         return 0.0
     voltage = commands.samples().voltage
     supply = loop.supply_voltage if voltage is None else voltage[:, joint]
-    limit = loop.conversion.max_duty if loop.max_duty is None else loop.max_duty
-    top = 0.999 * limit * (loop.volt_torque or 0.0) * np.asarray(supply)
+    top = 0.999 * loop.duty_limit * (loop.volt_torque or 0.0) * np.asarray(supply)
     return float(np.mean(np.abs(made.samples().effort[:, joint]) >= top))
 
 

@@ -56,7 +56,7 @@ def joint_torque(robot: Robot, samples: Samples, joint: int, delay: float) -> Ar
 
 def estimate_delays(robot: Robot, recordings: Sequence[Recording]) -> tuple[Delay, ...]:
     """Delays of all joints: stated, or of least unexplained torque; one that tells nothing takes the others' median."""
-    loops = [joint.actuator for joint in robot.joints]
+    loops = robot.actuators
     open_ = [joint for joint, loop in enumerate(loops) if loop is not None and loop.delay is None]
     found: dict[int, Delay] = {}
     if open_:

@@ -28,13 +28,12 @@ def is_open(joint: Joint) -> bool:
 
 def with_torque_per_volt(robot: Robot, values: dict[int, float], std: float | None = None) -> Robot:
     """The robot with torque per volt of some joints by index [Nm/V or N/V]; `std` is relative."""
-    joints = list(robot.joints)
+    loops = list(robot.actuators)
     for place, value in values.items():
-        loop = joints[place].actuator
-        if loop is not None:
-            known = replace(loop, torque_per_volt=value, scale_std=std if loop.scale_std is None else loop.scale_std)
-            joints[place] = replace(joints[place], actuator=known)
-    return replace(robot, joints=tuple(joints))
+        if (loop := loops[place]) is not None:
+            own = std if loop.scale_std is None else loop.scale_std
+            loops[place] = replace(loop, torque_per_volt=value, scale_std=own)
+    return robot.with_actuators(loops)
 
 
 def estimate_torque_per_volt(
@@ -59,7 +58,7 @@ def estimate_torque_per_volt(
         value = _fit(np.concatenate(rows), np.concatenate(volts), float(sum(weights)))
         if value is not None:
             found[joint] = value
-    servos = {joint: each.actuator.servo for joint, each in enumerate(robot.joints) if each.actuator is not None}
+    servos = {joint: loop.servo for joint, loop in enumerate(robot.actuators) if loop is not None}
     for joint in joints:
         same = [value for other, value in found.items() if servos.get(other) == servos.get(joint)]
         if joint not in found and same:

@@ -59,7 +59,7 @@ class Rollout:
     @property
     def document(self) -> RolloutDocument:
         """The result, typed."""
-        loops = [joint.actuator if self.is_closed else None for joint in self.robot.joints]
+        loops = self.robot.actuators if self.is_closed else (None,) * self.robot.joint_count
         return RolloutDocument(
             robot=self.robot.name,
             joints=[joint.name for joint in self.robot.joints],
@@ -169,16 +169,14 @@ def _models(robot: Robot, exports: Sequence[ExportModel]) -> list[RolloutModel]:
 
 def _complete_loops(robot: Robot, recordings: Sequence[Recording], known: Robot | None) -> tuple[Robot, bool]:
     """The robot with delays of its loops, and whether loops can close: commands of all joints are there."""
-    loops = [joint.actuator for joint in robot.joints]
+    loops = robot.actuators
     commands = [take_commands(recording) for recording in recordings]
     if not all(loop is not None and loop.has_loop for loop in loops) or any(each is None for each in commands):
         return robot, False
-    others = [None] * len(loops) if known is None else [joint.actuator for joint in known.joints]
-    filled = [
+    others = loops if known is None else known.actuators
+    robot = robot.with_actuators(
         loop if loop is None or other is None else _fill(loop, other) for loop, other in zip(loops, others, strict=True)
-    ]
-    joints = [replace(joint, actuator=loop) for joint, loop in zip(robot.joints, filled, strict=True)]
-    robot = replace(robot, joints=tuple(joints))
+    )
     for recording in recordings:
         require_loops(robot, recording)
     for number, joint in enumerate(robot.joints, 1):
@@ -189,11 +187,8 @@ def _complete_loops(robot: Robot, recordings: Sequence[Recording], known: Robot 
                 " that identify made from commands"
             )
     delays = estimate_delays(robot, [each for each in commands if each is not None])
-    done = [
-        joint if joint.actuator is None else replace(joint, actuator=replace(joint.actuator, delay=delay.value))
-        for joint, delay in zip(robot.joints, delays, strict=True)
-    ]
-    return replace(robot, joints=tuple(done)), True
+    pairs = zip(robot.actuators, delays, strict=True)
+    return robot.with_actuators(loop and replace(loop, delay=delay.value) for loop, delay in pairs), True
 
 
 def _fill(loop: Actuator, known: Actuator) -> Actuator:

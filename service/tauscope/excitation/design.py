@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tauscope.excitation.information import Criterion, reported_value
+from tauscope.excitation.information import Criterion
 from tauscope.excitation.margins import Margins, trajectory_margins
 from tauscope.excitation.optimiser import OptimiserProgress, optimise
 from tauscope.excitation.setting import ExcitationOptions, Setting
@@ -62,7 +62,7 @@ def design_excitation(
     segments = (FourierSegment(series, options.periods, first_period=0), *slow.segments, *closing)
     names = tuple(joint.name for joint in robot.joints)
     trajectory = Trajectory(robot.name, names, segments, setting.stated, record)
-    margins = trajectory_margins(trajectory, setting.stated, setting.states, setting.available)
+    margins = trajectory_margins(trajectory, setting.stated, setting.states)
     return ExcitationDesign(
         trajectory=replace(trajectory, design=record.model_copy(update={"margins": margins.as_table()})),
         series=series,
@@ -71,11 +71,7 @@ def design_excitation(
         value=value,
         condition_number=condition_number,
         random_value=result.random_value,
-        history=tuple(
-            HistoryPart(start=each.start, iteration=each.iteration, value=value, violation=each.violation)
-            for each in result.history
-            if np.isfinite(value := reported_value(options.criterion, each.own))
-        ),
+        history=tuple(result.history),
         margins=margins,
         active=_active(robot, margins, options),
         notes=_notes(robot, setting, slow),
@@ -86,12 +82,9 @@ def design_excitation(
 
 def _active(robot: Robot, margins: Margins, options: ExcitationOptions) -> tuple[str, ...]:
     spared = 1.0 - options.limit_fraction
-    kinds = {"position": spared, "velocity": spared, "acceleration": spared, "torque": 0.0}
-    table = margins.as_table()
     found = []
-    for kind, kept in kinds.items():
-        left = table.get(kind, (None,) * robot.joint_count)
-        pairs = zip(robot.joints, left, strict=True)
+    for kind, left in margins.as_table().items():
+        kept, pairs = 0.0 if kind in margins.drive else spared, zip(robot.joints, left, strict=True)
         found += [f"{kind} of {joint.name}" for joint, part in pairs if part is not None and part <= kept + ACTIVE]
     if margins.workspace_m is not None and margins.workspace_m <= ACTIVE_CLEARANCE_M:
         found.append("workspace")
@@ -106,6 +99,10 @@ def _notes(robot: Robot, setting: Setting, slow: SlowPart) -> tuple[str, ...]:
         missing = [joint.name for joint in robot.joints if joint.limits.torque is None]
         if missing:
             notes.append(f"torque is not constrained on {', '.join(missing)}: no limit is stated")
+    pairs = zip(robot.joints, robot.actuators, strict=True)
+    unknown = [joint.name for joint, loop in pairs if loop and loop.unit == "register" and not loop.stall_torque]
+    if unknown:
+        notes.append(f"{', '.join(unknown)}: servos limit nothing; state actuator.supply_voltage and torque_per_volt")
     wanted = setting.options.slow_postures
     if slow.postures < wanted:
         notes.append(f"slow reversals at {slow.postures} of {wanted} postures: no more have room within the limits")

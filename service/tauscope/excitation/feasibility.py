@@ -11,6 +11,7 @@ from tauscope.robot import Robot
 from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
 from tauscope.trajectory.limits import MotionLimits
+from tauscope.trajectory.servo_bounds import BOUNDS
 
 POSTURES = 2048  # random postures at which is asked whether the arm can stand there at all
 LEAST_HALF_RANGE = 1e-3  # half range below which a joint has no room to move [rad or m]
@@ -97,12 +98,13 @@ class Feasibility:
         if torque is not None:
             least = parts[0].min(axis=0)
             if least.max() > SETTLED:
-                j = int(np.argmax(least))
-                joint, needed = self.robot.joints[j], least[j] * torque.available[j]
-                unit = joint.type.torque_unit
+                row, j = divmod(int(np.argmax(least)), self.robot.joint_count)
+                joint, available = self.robot.joints[j], torque.bounds.available[row, j]
+                unit, name = joint.type.torque_unit, torque.bounds.names[row]
+                remedy = BOUNDS.get(name, "check the limit, the model and the margin")
                 raise ExcitationError(
-                    f"{joint.name}: torque limit: at rest the prior model needs {needed:.4g} {unit} or more in every "
-                    f"posture, {torque.available[j]:.4g} {unit} may be used; check the limit, the model and the margin"
+                    f"{joint.name}: {name} limit: at rest the prior model needs {least.max() * available:.4g} {unit} "
+                    f"or more in every posture, {available:.4g} {unit} may be used; {remedy}"
                 )
         if workspace is not None:
             worst = workspace.clearance(postures).max(axis=0)

@@ -1,6 +1,6 @@
 """What a trajectory leaves of every limit, and the refusal of one that leaves nothing."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,44 +25,39 @@ class Margins:
     position: Array  # (n,), of the range, from its middle
     velocity: Array  # (n,)
     acceleration: Array  # (n,)
-    # (n,), of what may be used, by the prior model; infinite without a limit, None without a model
-    torque: Array | None = None
+    # by kind, (n,), of what may be used, by the prior model; infinite without a limit, none without a model
+    drive: dict[str, Array] = field(default_factory=dict)
     # least clearance of joint origins and tool from floor and boxes [m]; None: nothing is forbidden
     workspace_m: float | None = None
 
     def as_table(self) -> dict[str, list[float | None]]:
         """Margins of the joints by kind of limit, None where there is no limit."""
-        kinds = {"position": self.position, "velocity": self.velocity, "acceleration": self.acceleration}
-        if self.torque is not None:
-            kinds["torque"] = self.torque
+        kinds = {"position": self.position, "velocity": self.velocity, "acceleration": self.acceleration, **self.drive}
         return {kind: [float(v) if np.isfinite(v) else None for v in values] for kind, values in kinds.items()}
 
 
-def trajectory_margins(
-    trajectory: Trajectory, limits: MotionLimits, states: StateUsage | None, available: Array
-) -> Margins:
-    """Margins over a whole trajectory; `available`: (n,), torque, infinite without limit [Nm or N]."""
-    usage = np.zeros((3, trajectory.joint_count))
-    torque = np.zeros(trajectory.joint_count)
-    clearance = np.inf
+def trajectory_margins(trajectory: Trajectory, limits: MotionLimits, states: StateUsage | None = None) -> Margins:
+    """Margins over a whole trajectory."""
+    usage, drive, clearance = np.zeros((3, trajectory.joint_count)), np.zeros(1), np.inf
+    prediction, workspace = (None, None) if states is None else (states.torque, states.workspace)
     for segment in trajectory.segments:
         motion, between = _sample_extremes(segment)
         usage = np.maximum(usage, _kinematic_usage(segment, motion, between, limits))
-        if states is not None and states.torque is not None:
-            torque = np.maximum(torque, states.torque.torque(motion).max(axis=0) / available)
-        if states is not None and states.workspace is not None:
-            clearance = min(clearance, float(states.workspace.clearance(motion.position).min()))
-    predicted = states is not None and states.torque is not None
-    return Margins(
-        *(1.0 - usage),
-        torque=np.where(np.isfinite(available), 1.0 - torque, np.inf) if predicted else None,
-        workspace_m=clearance if np.isfinite(clearance) else None,
-    )
+        if prediction is not None:
+            drive = np.maximum(drive, prediction.usage(motion).max(axis=0))
+        if workspace is not None:
+            clearance = min(clearance, float(workspace.clearance(motion.position).min()))
+    left: dict[str, Array] = {}
+    if prediction is not None:
+        bounds = prediction.bounds
+        parts = np.where(np.isfinite(bounds.available), 1.0 - drive.reshape(bounds.available.shape), np.inf)
+        left = dict(zip(bounds.names, parts, strict=True))
+    return Margins(*(1.0 - usage), drive=left, workspace_m=clearance if np.isfinite(clearance) else None)
 
 
 def require_within_limits(trajectory: Trajectory, robot: Robot, limits: MotionLimits, name: str = "trajectory") -> None:
     """Raise ExcitationError, which names joint, instant, value and limit, where a trajectory leaves a limit."""
-    margins = trajectory_margins(trajectory, limits, None, limits.torque)
+    margins = trajectory_margins(trajectory, limits)
     for kind in ("position", "velocity", "acceleration"):
         left = getattr(margins, kind)
         if (left >= -ROUNDING).all():

@@ -13,6 +13,7 @@ from tauscope.excitation.feasibility import Feasibility
 from tauscope.excitation.information import CriterionValue, reported_value
 from tauscope.excitation.problem import ExcitationProblem
 from tauscope.robot.robot import Array
+from tauscope.trajectory.document import HistoryPart
 
 CANDIDATES = 192  # random feasible series of which the best are improved
 STARTS = 4  # series that are improved from
@@ -32,22 +33,12 @@ class OptimiserProgress:
     best: float
 
 
-@dataclass(frozen=True)
-class HistoryEntry:
-    """One iteration."""
-
-    start: int  # from which start, counted from 1; 0 for the random series
-    iteration: int
-    own: float
-    violation: float
-
-
 @dataclass(eq=False)
 class OptimiserResult:
     """What came of it."""
 
     x: Array  # (n, columns), the best feasible vector found
-    history: list[HistoryEntry]
+    history: list[HistoryPart]
     evaluations: int
     seconds: float  # time that it took [s]
     random_value: float
@@ -73,7 +64,7 @@ class _Search:
     best: Array | None = None
     best_value: CriterionValue | None = None
     done: int = 0
-    history: list[HistoryEntry] = field(default_factory=list)
+    history: list[HistoryPart] = field(default_factory=list)
 
     def consider(self, x: Array) -> float:
         """Exact cost of a feasible vector, kept where it is the best."""
@@ -98,7 +89,8 @@ class _Search:
             count += 1
             own = problem.own(xk)
             violation = max(0.0, -float(problem.constraints(xk).min()))
-            self.history.append(HistoryEntry(start, count, own, violation))
+            if np.isfinite(value := reported_value(problem.criterion, own)):
+                self.history.append(HistoryPart(start=start, iteration=count, value=value, violation=violation))
             self.tell(f"start {start}", (first + count) / self.iterations, own)
 
         # The stubs want the constraint as a typed dictionary of their own.
@@ -167,6 +159,6 @@ def _candidates(search: _Search, rng: np.random.Generator) -> list[Array]:
     if not found:
         raise ExcitationError(
             f"none of {CANDIDATES} random motions within the limits shows all parameters: the limits leave hardly any "
-            "motion; widen those of position, velocity, torque or workspace"
+            "motion; widen those of position, velocity, torque, workspace or following error"
         )
     return [x for _, _, x in sorted(found, key=lambda each: each[:2])]

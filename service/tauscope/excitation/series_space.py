@@ -36,11 +36,6 @@ class SeriesSpace:
         self._cosine = null_space(np.ones((1, harmonics)))
         self._sine = null_space(self._order[None])
 
-    @property
-    def size(self) -> int:
-        """Number of free numbers."""
-        return self.joint_count * self.columns
-
     def series(self, x: Array) -> FourierSeries:
         """The series of a vector. `x`: (n, columns), centre and coefficients."""
         limits, free = self._limits, self.harmonics - 1
@@ -51,13 +46,6 @@ class SeriesSpace:
             speed * (x[:, 1 : 1 + free] @ self._cosine.T),
             speed * (x[:, 1 + free :] @ self._sine.T),
         )
-
-    def vector(self, series: FourierSeries) -> Array:
-        """The vector of a series that rests at its ends, (n, columns)."""
-        limits = self._limits
-        speed = limits.velocity[:, None]
-        centre = (series.centre - limits.middle) / limits.half_range
-        return np.column_stack([centre, series.cosine / speed @ self._cosine, series.sine / speed @ self._sine])
 
     def grid(self, samples: int) -> "SeriesGrid":
         """Equispaced instants of one period."""

@@ -1,6 +1,6 @@
 """What a design works with: one robot's limits, predictions and spaces, made once."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from tauscope.robot import Robot
 from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import FourierSeries, MotionSamples
 from tauscope.trajectory.limits import MotionLimits, motion_limits
+from tauscope.trajectory.servo_bounds import servo_bounds
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +40,7 @@ class ExcitationOptions:
     noise_std: Array | None = None
     limit_fraction: float = 0.95
     torque_margin: float = 0.2
+    following_error: float | None = None  # distance of a servo from its command [rad or m]; None: 0.2 rad or 0.05 m
     workspace: Workspace = field(default_factory=Workspace)
     slow_postures: int = 3
     closing_period: bool = True
@@ -53,6 +55,8 @@ class ExcitationOptions:
             "periods": not 1 <= self.periods <= 10_000 and "give 1 or more",
             "limit_fraction": not 0.0 < self.limit_fraction <= 1.0 and "give a number above 0 and up to 1",
             "torque_margin": not 0.0 <= self.torque_margin < 1.0 and "give a number from 0 to below 1",
+            "following_error": not (self.following_error is None or 0.0 < self.following_error < np.inf)
+            and "give a positive distance [rad or m]",
             "slow_postures": not 0 <= self.slow_postures <= 60 and "give 0 to 60",
             "starts": not 1 <= self.starts <= 64 and "give 1 to 64",
             "seed": self.seed < 0 and "give 0 or more",
@@ -82,7 +86,6 @@ class Setting:
     base: BaseParameters
     stated: MotionLimits
     planned: MotionLimits
-    available: Array  # (n,), torque that may be used, infinite where there is no limit [Nm or N]
     space: SeriesSpace
     states: StateUsage
     feasibility: Feasibility
@@ -96,22 +99,24 @@ class Setting:
         base = base_parameters(robot)
         stated = motion_limits(robot)
         require_room(robot, stated)
+        bounds = servo_bounds(robot, options.following_error).with_limit(stated.torque, 1.0 - options.torque_margin)
+        _require_torque(robot, stated, bounds.available[0])
         planned = stated.scaled(options.limit_fraction)
-        available = _available_torque(robot, stated, options)
+        planned = replace(planned, velocity=np.minimum(planned.velocity, bounds.speed))
         space = SeriesSpace(planned, options.period_s, options.harmonics)
         fine = space.grid(FINE_SAMPLES_PER_HARMONIC * options.harmonics)
         regressor = ExcitationRegressor(robot, base, capacity=REPORT_SAMPLES)
         torque = None
         if robot.model.links is not None:
-            torque = TorquePrediction(robot, base, regressor, stated.velocity, available)
+            torque = TorquePrediction(robot, base, regressor, stated.velocity, bounds)
         workspace = None if options.workspace.is_open else WorkspaceUsage(robot, options.workspace)
         if workspace is not None and not workspace.names:
             workspace = None
-        limited = torque if torque is not None and np.isfinite(available).any() else None
+        limited = torque if torque is not None and np.isfinite(bounds.available).any() else None
         states = StateUsage(limited, workspace)
         kinematics = KinematicUsage(space, planned)
         feasibility = Feasibility(robot, space, fine, planned, kinematics, states)
-        return Setting(robot, options, base, stated, planned, available, space, states, feasibility)
+        return Setting(robot, options, base, stated, planned, space, states, feasibility)
 
     def stages(self, rng: np.random.Generator) -> Stages:
         """What the optimiser sees."""
@@ -168,12 +173,10 @@ def _instants(series: FourierSeries, samples: int) -> MotionSamples:
     return series.evaluate(np.arange(float(samples)) * (series.period_s / samples))
 
 
-def _available_torque(robot: Robot, stated: MotionLimits, options: ExcitationOptions) -> Array:
-    available = (1.0 - options.torque_margin) * stated.torque
+def _require_torque(robot: Robot, stated: MotionLimits, available: Array) -> None:
     for joint, limit, value in zip(robot.joints, stated.torque, available, strict=True):
         if not value > 0.0:
             raise ExcitationError(
                 f"{joint.name}: torque limit {limit:.4g} less the margin leaves {value:.4g}; "
                 "lower the margin or raise the limit"
             )
-    return available

@@ -7,6 +7,7 @@ from tauscope.excitation.information import ExcitationRegressor, MotionGradient
 from tauscope.robot import FrictionCoefficients, Robot
 from tauscope.robot.robot import Array
 from tauscope.trajectory.fourier_series import MotionSamples
+from tauscope.trajectory.servo_bounds import TorqueBounds
 
 REST_SPEED = 1e-3  # part of the speed limit below which |v| is rounded off, for a gradient at rest
 SMALL_TORQUE = 1e-2  # part of the torque limit below which |τ| is rounded off, for a gradient where it changes its sign
@@ -15,11 +16,11 @@ SMALL_TORQUE = 1e-2  # part of the torque limit below which |τ| is rounded off,
 class TorquePrediction:
     """Upper bound of |τ|: rigid-body torque and the larger of stiction and Coulomb level, whichever way friction acts.
 
-    `velocity`: (n,), speed limits [rad/s or m/s]; `available`: (n,), torque, infinite where unlimited [Nm or N].
+    `velocity`: (n,), speed limits [rad/s or m/s]; `bounds`: of torque, with what the servos' own damping takes of it.
     """
 
     def __init__(
-        self, robot: Robot, base: BaseParameters, regressor: ExcitationRegressor, velocity: Array, available: Array
+        self, robot: Robot, base: BaseParameters, regressor: ExcitationRegressor, velocity: Array, bounds: TorqueBounds
     ) -> None:
         if robot.model.links is None:
             raise ValueError("the robot has no model: there is nothing to predict with")
@@ -31,12 +32,13 @@ class TorquePrediction:
         self._level = np.array([max(abs(f.stiction), abs(f.stiction + f.stribeck)) for f in friction])
         self._viscous = np.array([abs(f.viscous) for f in friction])
         self._rest = REST_SPEED * velocity
-        self.available = available
-        self._small = np.where(np.isfinite(available), SMALL_TORQUE * available, 1.0)
+        self.bounds = bounds
+        least = bounds.available.min(axis=0)
+        self._small = np.where(np.isfinite(least), SMALL_TORQUE * least, 1.0)
 
     def seen_by(self, regressor: ExcitationRegressor) -> "TorquePrediction":
         """The same prediction from another regressor's base columns."""
-        return TorquePrediction(self._robot, self._base_parameters, regressor, self._velocity, self.available)
+        return TorquePrediction(self._robot, self._base_parameters, regressor, self._velocity, self.bounds)
 
     def torque(self, motion: MotionSamples, base: Array | None = None) -> Array:
         """Bound of |τ| at every sample, (N, n) [Nm or N]; `base`: (n, m, N), where the caller has it."""
@@ -44,20 +46,21 @@ class TorquePrediction:
         return self._round_off(self._rigid(base), self._small) + self._friction(motion)
 
     def usage(self, motion: MotionSamples, base: Array | None = None) -> Array:
-        """Part of the available torque that is used, (N, n), zero without limit; `base`: (n, m, N)."""
-        return self.torque(motion, base) / self.available
+        """Used part of every bound, (N, bounds × n), zero without limit; `base`: (n, m, N)."""
+        speed = self._round_off(motion.velocity, self._rest)
+        return self.bounds.share(self.torque(motion, base), speed).reshape(len(speed), -1)
 
     def pull_back(self, motion: MotionSamples, base: Array, weight: Array) -> MotionGradient:
-        """Derivatives by the motion of Σ weight · usage; `weight`: (N, n), `base`: (n, m, N)."""
+        """Derivatives by the motion of Σ weight · usage; `weight`: (N, bounds × n), `base`: (n, m, N)."""
         rigid = self._rigid(base)
-        by_torque = weight / self.available
+        by_bound = weight.reshape(len(weight), *self.bounds.available.shape) / self.bounds.available
+        by_torque = by_bound.sum(axis=1)
+        by_speed = by_torque * self._viscous + (by_bound * self.bounds.damping).sum(axis=1)
         by_rigid = by_torque * rigid / self._round_off(rigid, self._small)
         columns = by_rigid.T[:, None, :] * self._base[None, :, None]
         gradient = self._regressor.pull_back_base(motion, columns)
         speed = motion.velocity / self._round_off(motion.velocity, self._rest)
-        return MotionGradient(
-            gradient.position, gradient.velocity + by_torque * self._viscous * speed, gradient.acceleration
-        )
+        return MotionGradient(gradient.position, gradient.velocity + by_speed * speed, gradient.acceleration)
 
     def _rigid(self, base: Array) -> Array:
         first = self._regressor.first_columns

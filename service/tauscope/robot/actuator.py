@@ -80,6 +80,18 @@ class Actuator:
         return self.conversion.torque_per_volt if self.torque_per_volt is None else self.torque_per_volt
 
     @property
+    def duty_limit(self) -> float:
+        """Largest duty: as stated, else as the servo's firmware has it, 0 to 1."""
+        return self.conversion.max_duty if self.max_duty is None else self.max_duty
+
+    @property
+    def stall_torque(self) -> float | None:
+        """Torque at full duty and rest [Nm or N]; None for a loop in SI, and where voltage or κ is not known."""
+        if self.unit != "register" or self.supply_voltage is None or self.volt_torque is None:
+            return None
+        return self.duty_limit * self.supply_voltage * self.volt_torque
+
+    @property
     def relative_std(self) -> float:
         """Relative standard error of the scale of its torque."""
         if self.scale_std is not None:
@@ -120,8 +132,7 @@ class Actuator:
         if self.unit == "Nm_per_rad":
             return gain * error - self.damping * velocity
         supply = self.supply_voltage if voltage is None else voltage
-        limit = self.conversion.max_duty if self.max_duty is None else self.max_duty
-        duty = np.clip(gain * self.conversion.duty_per_rad * error, -limit, limit)
+        duty = np.clip(gain * self.conversion.duty_per_rad * error, -self.duty_limit, self.duty_limit)
         warmth = 0.0 if temperature is None else np.nan_to_num(np.asarray(temperature) - ROOM_C)
         volt_torque = (self.volt_torque or 0.0) / (1.0 + self.temperature_slope * warmth)
         return volt_torque * (0.0 if supply is None else supply) * duty - self.damping * velocity

@@ -1,7 +1,7 @@
 """What the arm is: an open chain of joints, and what the user's simulation believes about its links."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -190,6 +190,16 @@ class Robot:
     def joint_count(self) -> int:
         """Number of joints n."""
         return len(self.joints)
+
+    @property
+    def actuators(self) -> tuple[Actuator | None, ...]:
+        """The drives, base first; None where nothing is stated."""
+        return tuple(joint.actuator for joint in self.joints)
+
+    def with_actuators(self, actuators: Iterable[Actuator | None]) -> "Robot":
+        """The arm with other drives, one a joint."""
+        pairs = zip(self.joints, actuators, strict=True)
+        return replace(self, joints=tuple(replace(joint, actuator=each) for joint, each in pairs))
 
     @property
     def files(self) -> tuple[tuple[str, Path], ...]:

@@ -47,7 +47,8 @@ def control(
         run = Run(task, record, Surroundings(folder, stops, keeper.keep, recorder, report))
     except TauscopeError as error:
         stops.done()
-        record = _refuse(record, error)
+        problem = records.RunProblem(code=error.code, detail=str(error))
+        record = record.moved(RunState.STOPPING, problem=problem).moved(RunState.FAILED)
         keeper.keep(record)
         report(end_event(record))
     else:
@@ -64,11 +65,6 @@ def _task(order: RunOrder, folder: Path, make: Callable[..., Connection]) -> Run
     trajectory = read_trajectory(order.trajectory, robot)
     name, settings = order.backend.name, order.backend.settings
     return RunTask(robot, trajectory, order.options, lambda: make(name, robot, settings, folder=folder))
-
-
-def _refuse(record: records.RunRecord, error: TauscopeError) -> records.RunRecord:
-    problem = records.RunProblem(code=error.code, detail=str(error))
-    return record.moved(RunState.STOPPING, problem=problem).moved(RunState.FAILED)
 
 
 def _event_pipe() -> Callable[[Mapping[str, Any]], None]:

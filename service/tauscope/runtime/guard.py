@@ -9,6 +9,7 @@ from tauscope.errors import AcquisitionError
 from tauscope.robot import JointType, Robot
 from tauscope.robot.robot import Array
 from tauscope.trajectory.limits import motion_limits
+from tauscope.trajectory.servo_bounds import DEFAULT_FOLLOWING
 from tauscope_drivers import ArmState, DriveLimits, Setpoint
 
 
@@ -49,12 +50,9 @@ class GuardViolationError(AcquisitionError):
         self.violation = violation
 
 
-DEFAULT_FOLLOWING = {JointType.REVOLUTE: 0.2, JointType.PRISMATIC: 0.05}
-"""Following error that is allowed where nothing is stated [rad or m]."""
 DEFAULT_MARGIN = {JointType.REVOLUTE: 0.05, JointType.PRISMATIC: 0.01}
 """How far outside the position limits the arm itself, not a command, may be found [rad or m]."""
-SPEED_MARGIN = 1.5
-"""Measured speed may be this many times the limit: a drive's velocity is noisy where it comes from its encoder."""
+SPEED_MARGIN = 1.5  # measured speed may be this many times the limit: velocity is noisy where encoders give it
 _ROOM = 1.05
 
 

@@ -1,6 +1,6 @@
 """The plan of a run, made before the arm is under power: targets and model torque of every cycle, and limits."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from tauscope.runtime.guard import GuardLimits, guard_limits
 from tauscope.runtime.options import RunOptions, choose_rate_hz
 from tauscope.trajectory.limits import motion_limits
 from tauscope.trajectory.segments import MoveSegment
+from tauscope.trajectory.servo_bounds import BOUNDS, TorqueBounds, servo_bounds
 from tauscope.trajectory.trajectory import Trajectory, ramp
 from tauscope_drivers import Capabilities, ControlMode
 
@@ -53,6 +54,7 @@ def _parameters(robot: Robot) -> Array | None:
 
 MOST_CYCLES = 4_000_000  # A longer run must be a mistake: it is more than two hours at 500 cycles a second
 _ROUNDING = 1e-9
+_LEAST_PACE = 0.1  # part of the speed limits below which no ramp is slowed down for weak servos: they are refused
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +90,17 @@ class Plan:
 
 
 def make_plan(
-    robot: Robot, trajectory: Trajectory, start: Array, options: RunOptions, capabilities: Capabilities
+    robot: Robot,
+    trajectory: Trajectory,
+    start: Array,
+    options: RunOptions,
+    capabilities: Capabilities,
+    voltage: Array | None = None,
 ) -> Plan:
-    """A minimum-jerk ramp from `start`, (n,), a pause, the motion. Raises AcquisitionError where they do not fit."""
+    """A minimum-jerk ramp from `start`, (n,), a pause, the motion. Raises AcquisitionError where they do not fit.
+
+    `voltage`: (n,), supply of the servos as measured [V].
+    """
     _require_fitting(robot, trajectory, start, capabilities)
     rate_hz = choose_rate_hz(options, capabilities)
     if trajectory.duration_s * rate_hz > MOST_CYCLES:
@@ -101,12 +111,13 @@ def make_plan(
     motion = trajectory.samples(rate_hz)
     speed = np.abs(np.diff(motion.position, axis=0)).max(axis=0, initial=0.0) * rate_hz
     low, high = motion.position.min(axis=0), motion.position.max(axis=0)
-    limits = guard_limits(
-        robot, low, high, speed, following=options.following_error, temperature_c=options.temperature_c
-    )
+    following, hottest = options.following_error, options.temperature_c
+    limits = guard_limits(robot, low, high, speed, following=following, temperature_c=hottest)
     _require_within(limits, robot, start, low, high, speed)
     begin = np.clip(start, limits.position_low, limits.position_high)
-    way = ramp(begin, trajectory.start, motion_limits(robot))
+    bounds, usual = servo_bounds(robot, limits.following, rate_hz, voltage), motion_limits(robot)
+    gentle = np.clip(bounds.speed, _LEAST_PACE * usual.velocity, usual.velocity)
+    way = ramp(begin, trajectory.start, replace(usual, velocity=gentle))
     way = MoveSegment(way.start, way.end, float(np.ceil(way.duration_s * rate_hz)) / rate_hz)
     ramp_cycles = round(way.duration_s * rate_hz)
     moved = way.evaluate(np.arange(ramp_cycles) / rate_hz)
@@ -116,12 +127,18 @@ def make_plan(
     velocity = np.concatenate([moved.velocity, rest, motion.velocity])
     acceleration = np.concatenate([moved.acceleration, rest, motion.acceleration])
     before = ramp_cycles + pause
+    gives_torque = options.mode is ControlMode.TORQUE or (options.feed_forward and capabilities.takes_feed_forward)
+    known = predict_torque(robot, position, velocity, acceleration) if gives_torque or bounds.names else None
+    torque = np.zeros_like(position) if known is None else known
+    _require_followed(robot, bounds, torque, velocity, rate_hz, droops=not gives_torque)
+    # A model may be wrong, the arm must not pay for it.
+    given = np.clip(torque, -limits.torque, limits.torque) if gives_torque else np.zeros_like(torque)
     return Plan(
         rate_hz=rate_hz,
         period_ns=round(1e9 / rate_hz),
         position=position,
         velocity=velocity,
-        torque=_feed_forward(robot, limits, options, capabilities, (position, velocity, acceleration)),
+        torque=given,
         period=np.concatenate([np.full(before, np.nan), motion.period]),
         phase=np.repeat([Phase.RAMP, Phase.MOTION], [before, len(motion.time)]).astype(np.int64),
         limits=limits,
@@ -131,10 +148,8 @@ def make_plan(
 def _require_fitting(robot: Robot, trajectory: Trajectory, start: Array, capabilities: Capabilities) -> None:
     """Refuse a motion or an arm of another number of joints, and an arm that does not say where it stands."""
     n = robot.joint_count
-    for count, what in (
-        (trajectory.joint_count, "the trajectory moves"),
-        (capabilities.joint_count, "the backend has"),
-    ):
+    counts = {"the trajectory moves": trajectory.joint_count, "the backend has": capabilities.joint_count}
+    for what, count in counts.items():
         if count != n:
             raise AcquisitionError(f"{robot.name} has {n} joints, {what} {count}; give what belongs to this arm")
     silent = [joint.name for joint, position in zip(robot.joints, start, strict=True) if not np.isfinite(position)]
@@ -160,14 +175,23 @@ def _require_within(limits: GuardLimits, robot: Robot, start: Array, low: Array,
             )
 
 
-def _feed_forward(
-    robot: Robot,
-    limits: GuardLimits,
-    options: RunOptions,
-    capabilities: Capabilities,
-    motion: tuple[Array, Array, Array],
-) -> Array:
-    """What the model predicts, cut to the torque limits: a model may be wrong, the arm must not pay for it."""
-    wanted = options.mode is ControlMode.TORQUE or (options.feed_forward and capabilities.takes_feed_forward)
-    torque = predict_torque(robot, *motion) if wanted else None
-    return np.zeros_like(motion[0]) if torque is None else np.clip(torque, -limits.torque, limits.torque)
+def _require_followed(
+    robot: Robot, bounds: TorqueBounds, torque: Array, velocity: Array, rate_hz: float, *, droops: bool
+) -> None:
+    """Refuse before it moves what a servo would lag behind until the guard stops it. NaN is refused.
+
+    `droops`: whether a servo exerts torque by its following error alone, and is not given it.
+    """
+    speed = np.abs(velocity)
+    for row, name in enumerate(bounds.names):
+        available = bounds.available[row] - bounds.damping[row] * speed
+        excess = np.abs(torque) - available
+        if (excess <= 0.0).all() or not (droops or name == "voltage"):
+            continue
+        cycle, j = (int(index) for index in np.unravel_index(np.argmax(excess), excess.shape))
+        joint = robot.joints[j]
+        raise AcquisitionError(
+            f"{joint.name}: {cycle / rate_hz:.3g} s after the start the motion needs {abs(torque[cycle, j]):.3g} "
+            f"{joint.type.torque_unit} at {speed[cycle, j]:.3g} {joint.type.unit}/s; its {name} leaves "
+            f"{max(available[cycle, j], 0.0):.3g} {joint.type.torque_unit} there; design it anew; {BOUNDS[name]}"
+        )

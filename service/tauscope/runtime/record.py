@@ -17,14 +17,12 @@ from tauscope.runtime.states import RunState, may_follow
 from tauscope.runtime.timing import RealTime, Timing
 from tauscope.strict_model import StrictModel
 
-_THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-
 
 def child_environment() -> dict[str, str]:
     """Environment of a child process: it imports the modules that this process has, and computes in one thread."""
     source = str(Path(__file__).resolve().parents[2])
     known = os.environ.get("PYTHONPATH")
-    threads = dict.fromkeys(_THREAD_SETTINGS, "1")
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     return {**os.environ, **threads, "PYTHONPATH": f"{source}{os.pathsep}{known}" if known else source}
 
 
@@ -181,6 +179,15 @@ def write_record(folder: Path, record: RunRecord) -> None:
     write_atomically(folder / RUN_FILE, record.model_dump_json(indent=1).encode())
 
 
+def keep_record(folder: Path, record: RunRecord) -> RunRecord:
+    """Write ``run.json`` and return the record. Raises AcquisitionError where the disk does not take it."""
+    try:
+        write_record(folder, record)
+    except OSError as error:
+        raise AcquisitionError(f"{folder}: the run's record cannot be written ({error.strerror or error})") from error
+    return record
+
+
 def read_record(folder: Path) -> RunRecord:
     """Read ``run.json``. Raises AcquisitionError where there is none, or it is damaged."""
     path = folder / RUN_FILE
@@ -237,7 +244,7 @@ class RecordKeeper:
             if record is None:
                 return
             try:
-                write_record(self._folder, record)
+                keep_record(self._folder, record)
                 self._problem = None
-            except OSError as error:
-                self._problem = f"{self._folder}: the run's record cannot be written ({error.strerror or error})"
+            except AcquisitionError as error:
+                self._problem = str(error)

@@ -20,7 +20,7 @@ from tauscope.runtime.guard import Guard, GuardViolationError
 from tauscope.runtime.loop import Cycles, GuardedArm, ProgressReporter, Report, end_event, state_event
 from tauscope.runtime.options import ORDER_FILE, RELEASE, RunOptions, choose_stop_policy, is_released
 from tauscope.runtime.plan import Plan, make_plan
-from tauscope.runtime.record import JOURNAL_FILE, RUN_FILE, RunProblem, RunRecord, Transition, new_record, write_record
+from tauscope.runtime.record import JOURNAL_FILE, RUN_FILE, RunProblem, RunRecord, Transition, keep_record, new_record
 from tauscope.runtime.recorder import DirectRecorder, Recorder, RecorderProcess, save_recording
 from tauscope.runtime.states import ManualStop, RunState, StopAskedError, Stops, raise_if_requested
 from tauscope.runtime.timing import SIMULATED_TIME, Metronome, real_time
@@ -44,7 +44,7 @@ class RunTask:
 class Surroundings:
     folder: Path
     stops: Stops
-    keep: Callable[[RunRecord], None]  # the newest record, whenever it changes; must not take time
+    keep: Callable[[RunRecord], object]  # the newest record, whenever it changes; must not take time
     open_recorder: OpenRecorder
     report: Report
 
@@ -64,7 +64,8 @@ def prepare(task: RunTask, backend: Backend, state: ArmState) -> Plan:
         raise AcquisitionError(
             f"a watchdog of {options.watchdog_s:g} s: this arm's drives take {shortest:g} to {longest:g} s"
         )
-    plan = make_plan(task.robot, task.trajectory, _sound(backend, state, options).position, options, capabilities)
+    state = _sound(backend, state, options)
+    plan = make_plan(task.robot, task.trajectory, state.position, options, capabilities, state.voltage)
     least = LEAST_CYCLES_A_WATCHDOG * plan.period_ns * 1e-9
     if options.watchdog_s < least:
         raise AcquisitionError(
@@ -320,7 +321,7 @@ def run_trajectory(
     options = options or RunOptions()
     prepare_folder(folder)
     record = new_record(robot.name, backend_name, options.mode.value)
-    keep = partial(_keep_at_once, folder)
+    keep = partial(keep_record, folder)
     around = Surroundings(folder, stops or ManualStop(), keep, open_recorder, report or (lambda _event: None))
     run = Run(RunTask(robot, trajectory, options, connect), record, around)
     keep(record)
@@ -349,15 +350,6 @@ def open_recorder(path: Path, header: JournalHeader, stops: Stops, is_real_time:
         recorder.close()
         raise
     return recorder
-
-
-def _keep_at_once(folder: Path, record: RunRecord) -> None:
-    """Write the record: in virtual time nobody is late."""
-    try:
-        write_record(folder, record)
-    except OSError as error:
-        place = f"{folder}: the run's record cannot be written"
-        raise AcquisitionError(f"{place} ({error.strerror or error})") from error
 
 
 SETTLED_S = 0.5  # time for which every joint has to stand still [s]

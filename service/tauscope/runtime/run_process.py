@@ -66,7 +66,7 @@ def recover_run(
         if record.state.is_end:
             return None
         if was_asked_to_stop and record.state is RunState.CREATED:
-            return _write(folder, record.moved(RunState.STOPPING).moved(RunState.STOPPED))
+            return records.keep_record(folder, record.moved(RunState.STOPPING).moved(RunState.STOPPED))
         return _interrupt(folder, record)
     finally:
         lock.release()
@@ -90,15 +90,7 @@ def _interrupt(folder: Path, record: records.RunRecord) -> records.RunRecord:
         recording = save_recording(folder, is_whole=False, lost_rows=UNKNOWN_LOSS)
     detail = _NEVER_MOVED if record.state in _WITHOUT_POWER and recording is None else _GONE
     problem = record.problem or records.RunProblem(code=INTERRUPTED, detail=detail)
-    return _write(folder, record.moved(RunState.INTERRUPTED, problem=problem, recording=recording))
-
-
-def _write(folder: Path, record: records.RunRecord) -> records.RunRecord:
-    try:
-        records.write_record(folder, record)
-    except OSError as error:
-        raise AcquisitionError(f"{folder}: the run's record cannot be written ({error.strerror or error})") from error
-    return record
+    return records.keep_record(folder, record.moved(RunState.INTERRUPTED, problem=problem, recording=recording))
 
 
 BEATS_A_HEARTBEAT = 5  # how often an owner says that it is alive in the time after which it counts as gone

@@ -47,13 +47,18 @@ class CampaignOptions(StrictModel):
         default=None, description="how what the model leaves out is diagnosed; null: it is not"
     )
 
+    def training_options(self) -> ExcitationDesignOptions:
+        """How the training motion is designed: servos may be as far behind as the run allows, if nothing is stated."""
+        allowed = self.excitation.following_error or self.run.following_error
+        return self.excitation.model_copy(update={"following_error": allowed})
+
     def held_out_options(self) -> ExcitationDesignOptions | None:
         """How the held-out motion is designed; None where there is none."""
         if self.held_out is None:
             return None
         seed = self.excitation.seed + 1 if self.held_out.seed is None else self.held_out.seed
         changes = {"seed": seed, "periods": self.held_out.periods, "slow_postures": 0, "closing_period": False}
-        return self.excitation.model_copy(update=changes)
+        return self.training_options().model_copy(update=changes)
 
 
 def backend_of_run(backend: BackendChoice, *, held_out: bool) -> BackendChoice:
@@ -101,7 +106,7 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     """
     folder = files.target("campaign")
     assert folder is not None  # noqa: S101 - a campaign has a folder
-    train = _record(request, request.excitation, files, folder / "train", progress)
+    train = _record(request, request.training_options(), files, folder / "train", progress)
     options = request.held_out_options()
     judge = None if options is None else _record(request, options, files, folder / "held-out", progress)
     inputs = {

@@ -47,6 +47,9 @@ class ExcitationDesignOptions(StrictModel):
     torque_margin: Annotated[FiniteFloat, Field(ge=0.0, lt=1.0)] = Field(
         default=0.2, description="part of each torque limit that is kept free for what the prior model does not know"
     )
+    following_error: Annotated[FiniteFloat, Field(gt=0.0)] | None = Field(
+        default=None, description="of position servos and their commands; null: as the run allows, 0.2 rad or 0.05 m"
+    )
     slow_postures: int = Field(
         default=3, ge=0, le=60, description="postures at which all joints reverse slowly, after the repeated part"
     )

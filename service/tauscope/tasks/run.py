@@ -83,7 +83,7 @@ def perform(request: Request, files: Files, progress: Progress) -> Result:
     assert folder is not None  # noqa: S101 - a run has a folder
     robot, trajectory = read_robot(files.find("robot", request.robot)), folder.parent / TRAJECTORY
     if request.trajectory is None:
-        options = ExcitationDesignOptions(seed=request.seed)
+        options = ExcitationDesignOptions(seed=request.seed, following_error=request.options.following_error)
         wanted = design_excitation.Request(robot=request.robot, options=options)
         designed = design_excitation.perform(wanted, files, progress)
         trajectory.write_bytes(designed.outputs[TRAJECTORY])

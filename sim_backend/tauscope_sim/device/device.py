@@ -12,7 +12,7 @@ from tauscope.robot.robot import Array, Robot
 from tauscope_drivers import ArmState, Capabilities, ControlMode, DriveLimits, DriverError, Setpoint, StopPolicy
 from tauscope_drivers.errors import DriverErrorKind
 from tauscope_drivers.limits import require_finite, require_sensible
-from tauscope_sim.device.drives import COMMANDED, POWERED, Activity, Drives, Motion, commanded_by, stopped_by
+from tauscope_sim.device.drives import COMMANDED, COMMANDED_BY, POWERED, Activity, Drives, Motion, stopped_by
 from tauscope_sim.device.faults import Disturbances, FaultCode, FaultLatch, Injection, device_fault
 from tauscope_sim.device.mechanism import Mechanism
 from tauscope_sim.scenario import Scenario
@@ -114,7 +114,7 @@ class SimulatedDevice:
         require_sensible(limits, motion.position, [f"joint {number + 1}" for number in range(len(motion.position))])
         self._drives.enable(self.activity, motion, copy.deepcopy(limits))
         self._enabling = stop_policy, round(watchdog_s * 1e9)
-        self.activity = commanded_by(mode)
+        self.activity = COMMANDED_BY[mode]
         self._fed_ns = self.time_ns
 
     def command(self, setpoint: Setpoint, sent_ns: int | None = None) -> None:

@@ -37,17 +37,12 @@ TRANSITIONS: dict[Activity, frozenset[Activity]] = {
     Activity.DAMPING: COMMANDED | {Activity.HOLDING, Activity.FREE},
     Activity.FREE: COMMANDED,
 }
-_BY_MODE = {ControlMode.POSITION: Activity.TRACKING, ControlMode.TORQUE: Activity.TORQUE}
+COMMANDED_BY = {ControlMode.POSITION: Activity.TRACKING, ControlMode.TORQUE: Activity.TORQUE}
 _BY_POLICY = {
     StopPolicy.HOLD: Activity.HOLDING,
     StopPolicy.DAMP: Activity.DAMPING,
     StopPolicy.TORQUE_OFF: Activity.FREE,
 }
-
-
-def commanded_by(mode: ControlMode) -> Activity:
-    """What enabling leads to."""
-    return _BY_MODE[mode]
 
 
 def stopped_by(activity: Activity, policy: StopPolicy) -> Activity:

@@ -18,7 +18,8 @@ class PlantArm(ServoArm):
     """The arm of a robot file with what a scenario conceals, and position loops that were tuned to it.
 
     Goals come in steps, so the loops are soft, damp the joint's own speed, and have no integral, as servos are
-    delivered: τ_j = H_jj (ω² (q_g − q)_j − 2 ω q̇_j) + g(q)_j, each joint for itself.
+    delivered: τ_j = H_jj (ω² (q_g − q)_j − 2 ω q̇_j) + g(q)_j, each joint for itself. A joint whose robot file states
+    a position loop has that one instead: it droops under load, and back-EMF slows it.
     """
 
     def __init__(self, robot: Robot, scenario: Scenario, position: ArrayLike) -> None:
@@ -27,6 +28,7 @@ class PlantArm(ServoArm):
         self._plant.place(position)
         super().__init__(self._plant.motor_motion)
         self._inertia = InertiaSchedule(robot, scenario.effects)
+        self._loops = {j: loop for j, loop in enumerate(robot.actuators) if loop and loop.kind == "position"}
         self._age = 0
 
     @override
@@ -41,4 +43,7 @@ class PlantArm(ServoArm):
             matrix, _, load = self._inertia.at(position)
             self._own_inertia, self._load = matrix.diagonal().copy(), load.copy()
         self._age = (self._age + 1) % _TICKS_PER_INERTIA
-        return self._own_inertia * (BANDWIDTH**2 * error - 2.0 * BANDWIDTH * velocity) + self._load
+        torque = self._own_inertia * (BANDWIDTH**2 * error - 2.0 * BANDWIDTH * velocity) + self._load
+        for joint, loop in self._loops.items():
+            torque[joint] = loop.torque(error[joint], velocity[joint])
+        return torque

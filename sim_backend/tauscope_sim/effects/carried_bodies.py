@@ -8,7 +8,7 @@ from pydantic import Field
 
 from tauscope.robot.document_fields import Number, Positive, Vector
 from tauscope.robot.robot import Array, LinkInertia, Robot
-from tauscope_sim.effects.effect import Effect, JointEffect, zero_vector
+from tauscope_sim.effects.effect import Effect, JointEffect
 from tauscope_sim.plant.rigid_bodies import RigidBodies
 from tauscope_sim.plant.term import Coordinates, Term
 
@@ -18,8 +18,8 @@ class Payload(Effect):
 
     effect_id: ClassVar[str] = "payload"
     mass: Positive  # m [kg]
-    offset: Vector = Field(default_factory=zero_vector)  # r [m]
-    moments: Vector = Field(default_factory=zero_vector)  # diagonal of I [kg m²]
+    offset: Vector = Field(default=[0.0, 0.0, 0.0])  # r [m]
+    moments: Vector = Field(default=[0.0, 0.0, 0.0])  # diagonal of I [kg m²]
 
     def check(self, robot: Robot) -> None:
         super().check(robot)

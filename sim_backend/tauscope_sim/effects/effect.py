@@ -59,16 +59,6 @@ def one_of(*words: str) -> Any:
     return BeforeValidator(_must_be(" or ".join(words), lambda value: isinstance(value, str) and value in words))
 
 
-def zero_vector() -> list[float]:
-    """Three zeros."""
-    return [0.0, 0.0, 0.0]
-
-
-def single_zero() -> list[float]:
-    """A zero for all."""
-    return [0.0]
-
-
 class ScenarioEntry(Document):
     """One entry of a scenario's list of effects: its fields are the entry's keys."""
 
@@ -129,6 +119,8 @@ class Side(StrEnum):
     FRICTION = "friction"  # on the motor's side, as friction that heats the joint
     MOTOR = "motor"  # on the motor's side
     LINK = "link"  # on the link's side: part of the load that the transmission carries
+    LOAD_GAIN = "load_gain"  # a unit of that load
+    LOAD_FRICTION = "load_friction"  # a unit of that load's magnitude, as friction
 
 
 class JointLaw(JointEffect):
@@ -145,25 +137,40 @@ class JointLaw(JointEffect):
 
 
 class FrictionLaw(SmoothSignEffect, JointLaw):
-    """A friction law τ(q, v) of one joint that uses A(v)."""
+    """A friction law τ = f(q, v) A(v) of one joint."""
 
     side: ClassVar[Side] = Side.FRICTION
+
+    def factor(self, q: float, v: float) -> tuple[float, float, float]:
+        """Factor f and its derivatives by q and v."""
+        raise NotImplementedError
+
+    def law(self, robot: Robot) -> Law:
+        k_v = self.steepness(robot)
+
+        def slopes(q: float, v: float) -> tuple[float, float]:
+            (f, by_position, by_velocity), sign = self.factor(q, v), smooth_sign(v, k_v)
+            return sign * by_position, f * smooth_sign_slope(v, k_v) + sign * by_velocity
+
+        return (lambda q, v: self.factor(q, v)[0] * smooth_sign(v, k_v)), slopes
 
 
 class _LawTerm(Term):
     def __init__(self, joint: int, place: int, side: Side, law: Law) -> None:
-        self._joint, self._place, self._side = joint, place, side.value
+        self._joint, self._place, self._side = joint, place, side
         self._torque, self._slopes = law
+        self.depends_on_load = side in (Side.LOAD_GAIN, Side.LOAD_FRICTION)
 
     def act(self, moment: Moment, forces: Forces) -> None:
         torque = self._torque(moment.position[self._place], moment.velocity[self._place])
-        getattr(forces, self._side)[self._joint] += torque
+        getattr(forces, self._side.value)[self._joint] += torque
 
     def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        place = self._place
+        place, load = self._place, moment.load[self._joint]
+        factor = {Side.LOAD_GAIN: load, Side.LOAD_FRICTION: abs(load)}.get(self._side, 1.0)
         by_position, by_velocity = self._slopes(moment.position[place], moment.velocity[place])
-        slopes.by_position[place, place] += by_position
-        slopes.by_velocity[place, place] += by_velocity
+        slopes.by_position[place, place] += factor * by_position
+        slopes.by_velocity[place, place] += factor * by_velocity
 
 
 class CoulombTerm(Term):

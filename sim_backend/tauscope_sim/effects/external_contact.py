@@ -15,7 +15,7 @@ from pydantic import Field
 
 from tauscope.robot.document_fields import Number, Positive, Vector
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import Effect, JointNumber, NotNegative, one_of, zero_vector
+from tauscope_sim.effects.effect import Effect, JointNumber, NotNegative, one_of
 from tauscope_sim.plant.rigid_bodies import RigidBodies
 from tauscope_sim.plant.term import Coordinates, Forces, Moment, Term
 
@@ -25,7 +25,7 @@ class ExternalContact(Effect):
 
     effect_id: ClassVar[str] = "external_contact"
     force: Vector | None = None  # F [N]
-    offset: Vector = Field(default_factory=zero_vector)  # contact point in the last link's frame [m]
+    offset: Vector = Field(default=[0.0, 0.0, 0.0])  # contact point in the last link's frame [m]
     joint: JointNumber | None = None  # joint, counted from 1
     torque: Number | None = None  # c [Nm or N]
     start: NotNegative  # t₀ [s]

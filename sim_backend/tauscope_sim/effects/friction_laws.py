@@ -6,7 +6,7 @@ from typing import ClassVar
 from tauscope.robot.document_fields import Number, Positive
 from tauscope.robot.robot import Robot
 from tauscope_sim.effects.effect import Exponent, FrictionLaw, JointLaw, Law, Side
-from tauscope_sim.friction import smooth_sign, smooth_sign_slope
+from tauscope_sim.plant.term import LARGEST_GAIN
 
 
 class CoulombFriction(FrictionLaw):
@@ -15,9 +15,8 @@ class CoulombFriction(FrictionLaw):
     effect_id: ClassVar[str] = "coulomb_friction"
     level: Number  # c [Nm or N]
 
-    def law(self, robot: Robot) -> Law:
-        c, k_v = self.level, self.steepness(robot)
-        return (lambda q, v: c * smooth_sign(v, k_v)), (lambda q, v: (0.0, c * smooth_sign_slope(v, k_v)))
+    def factor(self, q: float, v: float) -> tuple[float, float, float]:
+        return self.level, 0.0, 0.0
 
 
 class ViscousFriction(JointLaw):
@@ -39,19 +38,11 @@ class StribeckFriction(FrictionLaw):
     velocity: Positive  # v_s [rad/s or m/s]
     exponent: Exponent = 2.0
 
-    def law(self, robot: Robot) -> Law:
-        k_v = self.steepness(robot)
-
-        def decay(v: float) -> float:
-            return math.exp(-((abs(v) / self.velocity) ** self.exponent))
-
-        def slopes(q: float, v: float) -> tuple[float, float]:
-            # d exp(-x^α)/dv = -α x^α / v exp(-x^α), taken as zero at rest where A(v) vanishes too
-            power = self.exponent * (abs(v) / self.velocity) ** self.exponent
-            fall = smooth_sign(v, k_v) * power / v if v else 0.0
-            return 0.0, self.amplitude * decay(v) * (smooth_sign_slope(v, k_v) - fall)
-
-        return (lambda q, v: self.amplitude * smooth_sign(v, k_v) * decay(v)), slopes
+    def factor(self, q: float, v: float) -> tuple[float, float, float]:
+        power = (abs(v) / self.velocity) ** self.exponent
+        level = self.amplitude * math.exp(-power)
+        # d exp(-x^α)/dv = -α x^α / v exp(-x^α), taken as zero at rest where A(v) vanishes too
+        return level, 0.0, -level * self.exponent * power / v if v else 0.0
 
 
 class AsymmetricCoulomb(FrictionLaw):
@@ -60,12 +51,8 @@ class AsymmetricCoulomb(FrictionLaw):
     effect_id: ClassVar[str] = "asymmetric_coulomb"
     amplitude: Number  # c: friction of positive motion less that of negative motion [Nm or N]
 
-    def law(self, robot: Robot) -> Law:
-        c, k_v = self.amplitude, self.steepness(robot)
-        return (
-            lambda q, v: c * smooth_sign(v, k_v) if v > 0.0 else 0.0,
-            lambda q, v: (0.0, c * smooth_sign_slope(v, k_v) if v > 0.0 else 0.0),
-        )
+    def factor(self, q: float, v: float) -> tuple[float, float, float]:
+        return self.amplitude if v > 0.0 else 0.0, 0.0, 0.0
 
 
 class AsymmetricViscous(JointLaw):
@@ -106,12 +93,22 @@ class PositionDependentFriction(FrictionLaw):
     order: Positive = 1.0
     phase: Number = 0.0  # φ [rad]
 
-    def law(self, robot: Robot) -> Law:
-        c, k_v = self.amplitude, self.steepness(robot)
+    def factor(self, q: float, v: float) -> tuple[float, float, float]:
+        angle = self.order * q + self.phase
+        return self.amplitude * math.sin(angle), self.amplitude * self.order * math.cos(angle), 0.0
 
-        def slopes(q: float, v: float) -> tuple[float, float]:
-            angle = self.order * q + self.phase
-            by_position = c * smooth_sign(v, k_v) * self.order * math.cos(angle)
-            return by_position, c * smooth_sign_slope(v, k_v) * math.sin(angle)
 
-        return (lambda q, v: c * smooth_sign(v, k_v) * math.sin(self.order * q + self.phase)), slopes
+class LoadDependentFriction(FrictionLaw):
+    """τ = μ |L| A(v), L the torque that the transmission hands to the link; see `tauscope_sim.plant.term`."""
+
+    effect_id: ClassVar[str] = "load_dependent_friction"
+    side: ClassVar[Side] = Side.LOAD_FRICTION
+    mu: Positive  # μ [Nm/Nm]
+
+    def check(self, robot: Robot) -> None:
+        super().check(robot)
+        if self.mu > LARGEST_GAIN:
+            raise self.refused("mu", f"is {self.mu:g}: the transmission locks itself; make it at most {LARGEST_GAIN:g}")
+
+    def factor(self, q: float, v: float) -> tuple[float, float, float]:
+        return self.mu, 0.0, 0.0

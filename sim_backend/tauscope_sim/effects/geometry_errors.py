@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from tauscope.robot.document_fields import Number, Vector
 from tauscope.robot.kinematics import rotation_about
 from tauscope.robot.robot import Placement, Robot
-from tauscope_sim.effects.effect import Effect, JointNumber, zero_vector
+from tauscope_sim.effects.effect import Effect, JointNumber
 
 
 class BaseTilt(Effect):
@@ -35,8 +35,8 @@ class KinematicError(Effect):
 
     effect_id: ClassVar[str] = "kinematic_error"
     link: JointNumber  # j, counted from 1
-    translation: Vector = Field(default_factory=zero_vector)  # d [m]
-    rotation: Vector = Field(default_factory=zero_vector)  # r [rad]
+    translation: Vector = Field(default=[0.0, 0.0, 0.0])  # d [m]
+    rotation: Vector = Field(default=[0.0, 0.0, 0.0])  # r [rad]
 
     def check(self, robot: Robot) -> None:
         super().check(robot)

@@ -1,61 +1,50 @@
 """Torques that follow a joint's angle: cogging and the ripple of a gear under load, springs, cables, a constant."""
 
 import math
-from collections.abc import Callable
 from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from tauscope.robot.document_fields import Number, Positive
 from tauscope.robot.robot import Robot
-from tauscope_sim.effects.effect import Exponent, JointEffect, JointLaw, Law, Numbers, Side, one_of, single_zero
-from tauscope_sim.plant.term import LARGEST_GAIN, Coordinates, Forces, Moment, Slopes, Term
+from tauscope_sim.effects.effect import Exponent, JointLaw, Law, Numbers, Side, one_of
+from tauscope_sim.plant.term import LARGEST_GAIN
 
 
-class AngleHarmonics(JointEffect):
-    """s(q) = Σ a_i sin(k_i q' + φ_i), with q' = q, or gear ratio × q where it is periodic in the motor's angle."""
+class Cogging(JointLaw):
+    """τ = Σ a_i sin(k_i q' + φ_i), with q' = q, or gear ratio × q where it is periodic in the motor's angle."""
 
-    amplitude: Numbers
+    effect_id: ClassVar[str] = "cogging"
+    amplitude: Numbers  # a_i, a number or one an order [Nm or N]
     order: Numbers
-    phase: Numbers = Field(default_factory=single_zero)  # φ_i, a number or one an order [rad]
+    phase: Numbers = Field(default=[0.0])  # φ_i, a number or one an order [rad]
     angle: Annotated[str, one_of("joint", "motor")] = "joint"
 
     def check(self, robot: Robot) -> None:
         super().check(robot)
         for key in ("amplitude", "phase"):
-            count = len(getattr(self, key))
-            if count not in (1, len(self.order)):
-                raise self.refused(
-                    key, f"holds {count} numbers, order {len(self.order)}; give one each, or one for all"
-                )
+            count, wanted = len(getattr(self, key)), len(self.order)
+            if count not in (1, wanted):
+                raise self.refused(key, f"holds {count} numbers, order {wanted}; give one each, or one for all")
         if self.angle == "motor" and self.joint_of(robot).gear_ratio is None:
             raise self.refused("angle", "is motor, but the robot file states no gear_ratio for this joint; state it")
 
-    def sine_and_slope(self, robot: Robot) -> tuple[Callable[[float], float], Callable[[float], float]]:
+    def law(self, robot: Robot) -> Law:
         ratio = (self.joint_of(robot).gear_ratio or 1.0) if self.angle == "motor" else 1.0
         count = len(self.order)
         amplitude, phase = (value * count if len(value) == 1 else value for value in (self.amplitude, self.phase))
         parts = [(a, ratio * k, p) for a, k, p in zip(amplitude, self.order, phase, strict=True)]
         return (
-            lambda q: sum(a * math.sin(k * q + p) for a, k, p in parts),
-            lambda q: sum(a * k * math.cos(k * q + p) for a, k, p in parts),
+            lambda q, v: sum(a * math.sin(k * q + p) for a, k, p in parts),
+            lambda q, v: (sum(a * k * math.cos(k * q + p) for a, k, p in parts), 0.0),
         )
 
 
-class Cogging(AngleHarmonics, JointLaw):
-    """τ = Σ a_i sin(k_i q' + φ_i). `amplitude`: a_i [Nm or N], `phase`: φ_i [rad]: a number, or one an order."""
-
-    effect_id: ClassVar[str] = "cogging"
-
-    def law(self, robot: Robot) -> Law:
-        sine, slope = self.sine_and_slope(robot)
-        return (lambda q, v: sine(q)), (lambda q, v: (slope(q), 0.0))
-
-
-class TorqueRipple(AngleHarmonics):
+class TorqueRipple(Cogging):
     """τ = L Σ a_i sin(k_i q' + φ_i). `amplitude`: a_i [Nm/Nm], `phase`: φ_i [rad]: a number, or one an order."""
 
     effect_id: ClassVar[str] = "torque_ripple"
+    side: ClassVar[Side] = Side.LOAD_GAIN
 
     def check(self, robot: Robot) -> None:
         super().check(robot)
@@ -63,23 +52,6 @@ class TorqueRipple(AngleHarmonics):
         total = repeats * sum(abs(amplitude) for amplitude in self.amplitude)
         if total > LARGEST_GAIN:
             raise self.refused("amplitude", f"adds up to {total:g} of the load; make it at most {LARGEST_GAIN:g}")
-
-    def terms(self, robot: Robot, coordinates: Coordinates) -> tuple[Term, ...]:
-        return (_Ripple(self.index, coordinates.motor(self.index), *self.sine_and_slope(robot)),)
-
-
-class _Ripple(Term):
-    depends_on_load = True
-
-    def __init__(self, joint: int, place: int, sine: Callable[[float], float], slope: Callable[[float], float]) -> None:
-        self._joint, self._place, self._sine, self._slope = joint, place, sine, slope
-
-    def act(self, moment: Moment, forces: Forces) -> None:
-        forces.load_gain[self._joint] += self._sine(moment.position[self._place])
-
-    def linearise(self, moment: Moment, slopes: Slopes) -> None:
-        place = self._place
-        slopes.by_position[place, place] += moment.load[self._joint] * self._slope(moment.position[place])
 
 
 class JointSpring(JointLaw):

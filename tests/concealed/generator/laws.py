@@ -23,8 +23,8 @@ from tauscope_sim.effects.elastic_transmissions import Backlash, JointElasticity
 from tauscope_sim.effects.external_contact import ExternalContact
 from tauscope_sim.effects.friction_coupling import FrictionCoupling
 from tauscope_sim.effects.friction_drift import FrictionDrift
+from tauscope_sim.effects.friction_laws import LoadDependentFriction
 from tauscope_sim.effects.geometry_errors import BaseTilt, KinematicError
-from tauscope_sim.effects.load_dependent_friction import LoadDependentFriction
 from tauscope_sim.effects.periodic_torques import TorqueRipple
 from tauscope_sim.effects.presliding_hysteresis import PreslidingHysteresis
 from tauscope_sim.model import build_model
@@ -50,6 +50,13 @@ def law_torque(robot: Robot, effect: Effect, passage: Passage) -> Array | None:
     q, v = passage.position, passage.velocity
     torque = np.zeros_like(q)
     match effect:
+        case LoadDependentFriction():
+            j = effect.index
+            torque[:, j] = effect.mu * np.abs(_load(robot, passage)[:, j]) * _sign(v[:, j], effect.steepness(robot))
+        case TorqueRipple():
+            ripple, _ = effect.law(robot)
+            gain = [ripple(x, 0.0) for x in q[:, effect.index]]
+            torque[:, effect.index] = _load(robot, passage)[:, effect.index] * gain
         case JointLaw():
             law, _ = effect.law(robot)
             j = effect.index
@@ -59,12 +66,6 @@ def law_torque(robot: Robot, effect: Effect, passage: Passage) -> Array | None:
             common = v[:, effect.index] + sign * v[:, effect.other_joint - 1]
             friction = effect.coulomb * _sign(common, effect.steepness(robot)) + effect.viscous * common
             torque[:, effect.index], torque[:, effect.other_joint - 1] = friction, sign * friction
-        case LoadDependentFriction():
-            j = effect.index
-            torque[:, j] = effect.mu * np.abs(_load(robot, passage)[:, j]) * _sign(v[:, j], effect.steepness(robot))
-        case TorqueRipple():
-            sine, _ = effect.sine_and_slope(robot)
-            torque[:, effect.index] = _load(robot, passage)[:, effect.index] * [sine(x) for x in q[:, effect.index]]
         case RotorInertia():
             torque[:, effect.index] = effect.inertia * _acceleration(v)[:, effect.index]
         case PreslidingHysteresis():

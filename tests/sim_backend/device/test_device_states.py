@@ -8,7 +8,7 @@ import pytest
 from arm_rigs import START, bench_robot, wide_limits
 from tauscope_drivers import ControlMode, DriverError, Setpoint, StopPolicy
 from tauscope_sim.device import HOTTEST, Activity, Disturbance, FaultCode, Injection, SimulatedDevice
-from tauscope_sim.device.drives import COMMANDED, POWERED, TRANSITIONS, commanded_by, stopped_by
+from tauscope_sim.device.drives import COMMANDED, COMMANDED_BY, POWERED, TRANSITIONS, stopped_by
 from tauscope_sim.device.faults import REMEDIES, FaultLatch, device_fault
 from tauscope_sim.device.mechanism import resting_posture
 from tauscope_sim.driver import SimulatedArm
@@ -38,7 +38,7 @@ def test_a_stop_is_legal_everywhere_and_never_adds_power(activity: Activity, pol
 def test_an_arm_is_never_braked_again_by_its_drives() -> None:
     assert set(TRANSITIONS) == set(Activity)
     assert not any(Activity.BRAKED in after for after in TRANSITIONS.values())
-    assert {commanded_by(mode) for mode in ControlMode} == set(COMMANDED)
+    assert {COMMANDED_BY[mode] for mode in ControlMode} == set(COMMANDED)
 
 
 def test_every_fault_has_a_remedy_in_one_line() -> None:

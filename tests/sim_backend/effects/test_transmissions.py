@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tauscope_sim.effects.carried_bodies import RotorInertia
 from tauscope_sim.effects.elastic_transmissions import Backlash, JointElasticity
-from tauscope_sim.effects.load_dependent_friction import LoadDependentFriction
+from tauscope_sim.effects.friction_laws import LoadDependentFriction
 from tauscope_sim.effects.periodic_torques import Cogging, JointSpring, TorqueRipple
 from tauscope_sim.plant import Plant
 from tauscope_sim.plant.term import loaded_accelerations

@@ -13,7 +13,7 @@ from tauscope_sim.effects.carried_bodies import PayloadChange
 from tauscope_sim.effects.elastic_transmissions import Backlash, JointElasticity
 from tauscope_sim.effects.external_contact import ExternalContact
 from tauscope_sim.effects.friction_drift import FrictionDrift
-from tauscope_sim.effects.load_dependent_friction import LoadDependentFriction
+from tauscope_sim.effects.friction_laws import LoadDependentFriction
 from tauscope_sim.effects.presliding_hysteresis import PreslidingHysteresis
 from tauscope_sim.plant import Plant
 

@@ -152,7 +152,7 @@ class CampaignRunner:
         made, order = self._workspace.read_made(), self._order
         if not made.recordings:
             self._begin("design the motion")
-            excitation = self._design(order.excitation, "excitation")
+            excitation = self._design(order.training_options(), "excitation")
             held_out_options = order.held_out_options()
             held_out = held_out_options and self._design(held_out_options, "held_out_excitation")
             self._wait("excitation", excitation)

@@ -43,7 +43,7 @@ from tauscope.server.http.services import Services, open_services, require_data_
 from tauscope.server.http.settings import Settings
 from tauscope.server.page.router import router as page
 
-API_VERSION = "1.25.1"
+API_VERSION = "1.26.0"
 """Of the interface, not of the package; a change of tests/server/http/openapi.json goes with a change here."""
 VERBS = (
     *(module.router for module in (campaigns, excitations, runs, recordings)),

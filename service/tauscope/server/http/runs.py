@@ -194,7 +194,7 @@ def _submit(
     if order.excitation is not None:
         take_trajectory(EXCITATIONS.finished(services, order.excitation), workspace)
     elif not is_sent:
-        options = ExcitationDesignOptions(seed=handed.document.seed)
+        options = ExcitationDesignOptions(seed=handed.document.seed, following_error=order.options.following_error)
         design = ExcitationOrder(**handed.robot_fields, options=options)
         put_robot = partial(shutil.copytree, workspace.robot, dirs_exist_ok=True)
         identifier = submit_job(services.jobs, kind, ExcitationWorkspace, design, put_robot)
