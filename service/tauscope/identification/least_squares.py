@@ -170,6 +170,9 @@ REWEIGHTINGS = 1
 SMALLEST_TORQUE = 1e-9  # torque below which a recording has none [Nm or N]
 # Share of a joint's torque that counts as its noise at least: no sensor resolves more, and weights stay finite.
 FINEST_TORQUE = 1e-6
+# Share of the arm's largest torque by which a joint without torque breaks its equation at least: a link of nothing
+# would keep it exactly, and so be certain.
+PASSIVE_TORQUE = 1e-2
 
 
 class Estimator(StrEnum):
@@ -197,13 +200,23 @@ def single_joint_std(factors: tuple[JointFactor, ...]) -> Array:
 
 
 def _noise_std(factors: tuple[JointFactor, ...], squares: list[float], size: int) -> Array:
-    """σ_j with the degrees of freedom that the parameters took, shared by rows; never below `FINEST_TORQUE`."""
+    """σ_j with the degrees of freedom that the parameters took, shared by rows; never below `least_std`."""
     total = sum(factor.rows for factor in factors)
     freedom = np.array([factor.rows * max(1.0 - size / total, 1e-3) for factor in factors])
-    return np.maximum(np.sqrt(np.array(squares) / freedom), FINEST_TORQUE * torque_rms(factors))
+    return np.maximum(np.sqrt(np.array(squares) / freedom), least_std(factors))
 
 
 def torque_rms(factors: tuple[JointFactor, ...]) -> Array:
-    """Root mean square of each joint's torque, (n,); positive also where a joint, or every one, has none."""
-    rms = np.sqrt([np.sum(factor.triangle[:, -1] ** 2) / factor.rows for factor in factors])
-    return np.maximum(rms, FINEST_TORQUE * max(rms.max(), SMALLEST_TORQUE))
+    """Root mean square of each joint's torque, (n,); the arm's largest at a passive joint, which has none."""
+    rms = np.array([np.linalg.norm(factor.triangle[:, -1]) / np.sqrt(factor.rows) for factor in factors])
+    return np.asarray(np.where(_is_passive(rms), max(rms.max(), SMALLEST_TORQUE), rms), dtype=np.float64)
+
+
+def least_std(factors: tuple[JointFactor, ...]) -> Array:
+    """σ_j that no joint falls below, (n,)."""
+    rms = np.array([np.linalg.norm(factor.triangle[:, -1]) / np.sqrt(factor.rows) for factor in factors])
+    return np.where(_is_passive(rms), PASSIVE_TORQUE, FINEST_TORQUE) * torque_rms(factors)
+
+
+def _is_passive(rms: Array) -> NDArray[np.bool_]:
+    return np.asarray(rms <= FINEST_TORQUE * max(rms.max(), SMALLEST_TORQUE))

@@ -17,7 +17,7 @@ from scipy.linalg import qr, solve_triangular, svd
 from tauscope.dynamics.friction import FRICTION_COLUMNS
 from tauscope.identification.consistency import Prior, plausible_prior
 from tauscope.identification.full_parameters import FullParameters
-from tauscope.identification.least_squares import FINEST_TORQUE, Estimator, JointFactor, stacked_factor, torque_rms
+from tauscope.identification.least_squares import Estimator, JointFactor, least_std, stacked_factor, torque_rms
 from tauscope.identification.structure import ModelStructure
 from tauscope.recording.recording import Array
 
@@ -150,4 +150,4 @@ def _noise_std(factors: tuple[JointFactor, ...], parameters: Array, covariance: 
     rows = np.array([factor.rows for factor in factors])
     if estimator is Estimator.LS:
         return np.full(len(factors), np.sqrt(sum(squares) / rows.sum()))
-    return np.maximum(np.sqrt(squares / rows), FINEST_TORQUE * torque_rms(factors))
+    return np.maximum(np.sqrt(squares / rows), least_std(factors))
