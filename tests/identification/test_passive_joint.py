@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from tauscope.identification import identify
+from tauscope.identification import document, identify
 from tauscope.recording import Recording
 from tauscope.robot import read_robot
 
@@ -79,3 +79,5 @@ def test_what_hangs_on_a_passive_joint_is_found(driven: int, tmp_path: Path) -> 
     assert values["Izz2 + 0.3*msx2"] == pytest.approx(about_tip, rel=0.05)
     assert values["viscous elbow"] == pytest.approx(VISCOUS[1], rel=0.2)
     assert not found.reversed_joints
+    silent = [each.joint for each in document(found).warnings if each.code == "no-torque"]
+    assert silent == [("elbow", "shoulder")[driven]]

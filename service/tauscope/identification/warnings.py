@@ -29,6 +29,7 @@ def identification_warnings(result: Identification) -> list[ResultWarning]:
     return [
         *_signs(result),
         *_scale(result),
+        *_passive_joints(result),
         *robot_warnings(result.robot),
         *result.recording_warnings,
         *_bodies(result),
@@ -89,6 +90,17 @@ def _scale(result: Identification) -> Iterator[ResultWarning]:
             text=f"gravity's torque is {scale:.3g} times what the masses of the robot file weigh: is the torque in Nm?",
             remedy="check `torque_constant` and `gear_ratio`, or the masses",
         )
+
+
+def _passive_joints(result: Identification) -> Iterator[ResultWarning]:
+    for joint, torque in zip(result.robot.joints, result.residuals.fit.torque_rms, strict=True):
+        if torque == 0.0:
+            yield ResultWarning(
+                code="no-torque",
+                joint=joint.name,
+                text=f"{joint.name}: its torque is zero throughout: it counts as a passive joint",
+                remedy="if it has a motor, record its torque or current",
+            )
 
 
 def _bodies(result: Identification) -> Iterator[ResultWarning]:
