@@ -59,13 +59,17 @@ class WhiteColumns:
         """Columns of all parameters at one joint."""
         factor, (places, amplitudes) = self._scale(model, joint), model.slope_amplitudes(joint)
         slopes = factor * amplitudes[:, None] * self._white_friction_slopes(model, joint)
-        index = [*map(int, model.structure.joint_columns(joint)), *places]
+        index = [int(place) for place in model.structure.joint_columns(joint)]
         rows = [factor * self._white_rigid(joint), factor * self._white_friction(model, joint)]
-        rows.append(slopes + self._of_steps(model, joint, places))
-        for term, place in self._terms_at(model, joint):
-            index += range(place.start, place.stop)
+        terms = self._terms_at(model, joint)
+        for term, place in terms:
+            index += range(place.start, place.start + len(term.coefficients))
             rows.append(self._white_term(model, term)[joint])
+        index += places
+        rows.append(slopes + self._of_steps(model, joint, places))
+        for term, place in terms:
             if term.free_shapes:
+                index += range(place.start + len(term.coefficients), place.stop)
                 rows.append(term.coefficients @ self._white_shape_slopes(model, term)[joint])
         return JointColumns(np.array(index, dtype=np.intp), np.concatenate(rows))
 
