@@ -10,7 +10,7 @@ from diagnosis.made_up_findings import finding, form
 from identification.simulated import paper_robot
 from tauscope.diagnosis import Diagnosis
 from tauscope.diagnosis.findings.plain import _without, states_friction, undeclared_offsets, with_plain_terms
-from tauscope.diagnosis.model.extended import stepped
+from tauscope.diagnosis.model.extended import move_model
 from tauscope.effects.joint_spring import JointSpring
 from tauscope.robot import FrictionCoefficients
 
@@ -96,7 +96,7 @@ def test_without_a_term_the_rows_are_worse_by_its_share_and_the_others_move() ->
     """In least squares the energy grows by c² over the variance of c; nothing else is held."""
     sound = sound_arm()
     fit, place = sound.fitter.projected(sound.selection.fit.model), place_of(sound, "viscous")
-    fit = replace(fit, model=stepped(fit.model, fit.projection.step))
+    fit = replace(fit, model=move_model(fit.model, fit.projection.step))
     without = _without(fit, place)
     assert without.parameters[place] == 0.0
     expected = fit.model.parameters[place] ** 2 / fit.covariance[place, place]

@@ -9,7 +9,7 @@ from diagnosis.diagnosed_arm import at_joint, recordings
 from identification.simulated import Array, SimulatedArm, paper_robot
 from tauscope.diagnosis import Diagnosis, diagnose, document
 from tauscope.diagnosis.findings.finding import Finding
-from tauscope.diagnosis.model.extended import ExtendedModel, stepped, with_terms
+from tauscope.diagnosis.model.extended import ExtendedModel, move_model, with_terms
 from tauscope.diagnosis.model.residual import predicted_rows
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.model.torque_scale import covariance_on_the_arm, on_the_arm
@@ -89,7 +89,7 @@ def test_cogging_is_told_as_large_as_it_is(diagnosis: Diagnosis) -> None:
     at_nine = replace(teeth, shape=np.array([9.0]))
     terms = [term(diagnosis, "torque_gain_error", JOINT, 0.1), at_nine]
     fit = diagnosis.fitter.projected(with_terms(diagnosis.selection.nominal.model, terms))
-    fit = replace(fit, model=stepped(fit.model, fit.projection.step))
+    fit = replace(fit, model=move_model(fit.model, fit.projection.step))
     covariance = covariance_on_the_arm(fit.model, 1, fit.covariance)
     found = Finding((fit.model.terms[1],), (covariance,), 1e3, 0.9, diagnosis.before, diagnosis.after)
     told = document(replace(diagnosis, selection=replace(diagnosis.selection, fit=fit), findings=(found,)))

@@ -208,15 +208,17 @@ def _noise_std(factors: tuple[JointFactor, ...], squares: list[float], size: int
 
 def torque_rms(factors: tuple[JointFactor, ...]) -> Array:
     """Root mean square of each joint's torque, (n,); the arm's largest at a passive joint, which has none."""
-    rms = np.array([np.linalg.norm(factor.triangle[:, -1]) / np.sqrt(factor.rows) for factor in factors])
-    return np.asarray(np.where(_is_passive(rms), max(rms.max(), SMALLEST_TORQUE), rms), dtype=np.float64)
+    return _measure_torque(factors)[0]
 
 
 def least_std(factors: tuple[JointFactor, ...]) -> Array:
     """σ_j that no joint falls below, (n,)."""
+    rms, is_passive = _measure_torque(factors)
+    return np.where(is_passive, PASSIVE_TORQUE, FINEST_TORQUE) * rms
+
+
+def _measure_torque(factors: tuple[JointFactor, ...]) -> tuple[Array, NDArray[np.bool_]]:
     rms = np.array([np.linalg.norm(factor.triangle[:, -1]) / np.sqrt(factor.rows) for factor in factors])
-    return np.where(_is_passive(rms), PASSIVE_TORQUE, FINEST_TORQUE) * torque_rms(factors)
-
-
-def _is_passive(rms: Array) -> NDArray[np.bool_]:
-    return np.asarray(rms <= FINEST_TORQUE * max(rms.max(), SMALLEST_TORQUE))
+    largest = max(float(rms.max()), SMALLEST_TORQUE)
+    is_passive = np.asarray(rms <= FINEST_TORQUE * largest)
+    return np.where(is_passive, largest, rms), is_passive

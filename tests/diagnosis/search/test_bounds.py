@@ -11,7 +11,7 @@ from diagnosis.evidence.test_linear_model import problem
 from diagnosis.nominal_arm import identify_arm, nominal_rows
 from tauscope.diagnosis.evidence.linear_model import LinearModel
 from tauscope.diagnosis.evidence.rows import EvidenceRows
-from tauscope.diagnosis.model.extended import stepped, with_terms
+from tauscope.diagnosis.model.extended import move_model, with_terms
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.search import hypothesis
 from tauscope.diagnosis.search.hypothesis import Laboratory, Prior
@@ -74,7 +74,7 @@ def test_a_step_leads_no_gap_beyond_the_one_by_which_the_link_moves() -> None:
     (own,) = model.term_places()
     step = np.zeros(model.size)
     step[own] = [-0.6e-3, 0.5e-3]
-    (found,) = stepped(model, step).terms
+    (found,) = move_model(model, step).terms
     assert found.coefficients == pytest.approx([0.4e-3])
     assert found.shape[0] == pytest.approx(2.0 * 0.4e-3)
     assert not play.is_consistent(found.coefficients, found.shape)

@@ -214,7 +214,7 @@ def with_terms(model: ExtendedModel, terms: Sequence[Term]) -> ExtendedModel:
     return replace(model, terms=tuple(terms))
 
 
-def stepped(model: ExtendedModel, step: Array) -> ExtendedModel:
+def move_model(model: ExtendedModel, step: Array) -> ExtendedModel:
     """The model moved by a step, (p,), each shape within its bounds and what its coefficients let it be."""
     size = model.structure.size
     terms = list(model.structure.terms)

@@ -44,7 +44,7 @@ class JointNoise:
         return replace(self, model=model)
 
     def at_least(self, std: float) -> "JointNoise":
-        """Noise of the same colour, whose standard deviation is not below one."""
+        """Noise of the same colour, of a standard deviation not below `std`."""
         return self.times(max(1.0, std / float(np.sqrt(self.model.variance))))
 
     def whitened(self, rows: Array) -> Array:

@@ -11,7 +11,7 @@ from tauscope.diagnosis.evidence.linear_model import LinearModel, Posterior
 from tauscope.diagnosis.evidence.rows import EvidenceRows
 from tauscope.diagnosis.evidence.scales import Scales
 from tauscope.diagnosis.fitting.bounded_step import bounded_step
-from tauscope.diagnosis.model.extended import STATED_ERROR, ExtendedModel, stepped, with_terms
+from tauscope.diagnosis.model.extended import STATED_ERROR, ExtendedModel, move_model, with_terms
 from tauscope.diagnosis.model.term import Term
 from tauscope.diagnosis.observations.observations import FINEST
 from tauscope.identification import Identification
@@ -216,7 +216,7 @@ class Laboratory:
         step, links = self._step(at)
         for part in HALVINGS:
             own = np.clip(part * step, *_bounds(at.model))
-            moved = replace(stepped(at.model, own), links=at.model.links + part * links)
+            moved = replace(move_model(at.model, own), links=at.model.links + part * links)
             found = self.at(moved, at.sizes, at.scales, at.dependence, owned=True)
             if found.misfit < at.misfit:
                 return found
