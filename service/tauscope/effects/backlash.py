@@ -4,7 +4,6 @@ Stiff teeth stop the link; on springy ones it swings, at frequencies that a diag
 """
 
 import math
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -36,7 +35,6 @@ LOSSES = np.array([0.8, 8.0, 80.0])
 # Damping ratio of teeth that touch, beside what they lose under load: where less is lost a link bounces on, but when it
 # comes back hangs on everything that a recording does not show.
 DAMPING = 0.2
-FLIGHT = 64  # samples of a flight that are looked at first: few links need more to cross the gap
 
 
 def place_between_teeth(load: Array, inertia: Array, gap: float, rate_hz: float) -> Array:
@@ -54,16 +52,12 @@ def place_between_teeth(load: Array, inertia: Array, gap: float, rate_hz: float)
     speed = cumulative_trapezoid(load / inertia, time, initial=0) / gap
     way = cumulative_trapezoid(speed, time, initial=0)
     place, side, begin = np.empty(len(load)), sides[0], 0
-    turns = [*np.flatnonzero(np.diff(sides)) + 1, len(load)]
     while begin < len(load):
-        parted = begin if sides[begin] != side else int(turns[bisect_right(turns, begin)])
+        parted = begin + _first(sides[begin:] != side)
         place[begin:parted] = side
         if parted == len(load):
             break
-        flight, most = np.empty(0), FLIGHT
-        while not len(flight) or ((np.abs(flight[1:]) < 0.5).all() and parted + len(flight) < len(load)):
-            ahead, most = slice(parted, parted + most), 4 * most
-            flight = side + way[ahead] - way[parted] - speed[parted] * (time[ahead] - time[parted])
+        flight = side + way[parted:] - way[parted] - speed[parted] * (time[parted:] - time[parted])
         flown = 1 + _first(np.abs(flight[1:]) >= 0.5)
         place[parted : parted + flown] = flight[:flown]
         side, begin = np.copysign(0.5, flight[min(flown, len(flight) - 1)]), parted + flown

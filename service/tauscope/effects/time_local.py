@@ -77,8 +77,6 @@ def open_share(shapes: Array, recording: int, time: Array, interval_s: float) ->
     the beginning of the recording [s]; `interval_s`: what one instant stands for [s].
     """
     scope, start, end, profile = np.moveaxis(shapes[..., :4], -1, 0)
-    if shapes.ndim == 1 and 0.0 <= scope != recording and profile != OUTSIDE:  # most are of another recording
-        return np.zeros_like(time)
     first = np.where(scope < EVERY, -2.0 - scope, np.inf)  # the recording in which it opens for good
     share = np.clip((time - start) / interval_s + 0.5, 0.0, 1.0)
     share = share * np.where(scope < EVERY, 1.0, np.clip((end - time) / interval_s + 0.5, 0.0, 1.0))
